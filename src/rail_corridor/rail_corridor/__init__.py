@@ -1,0 +1,1 @@
+"""Scenarios, launcher, report and the ``rail`` command line."""

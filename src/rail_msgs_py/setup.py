@@ -1,0 +1,20 @@
+from setuptools import find_packages, setup
+
+package_name = "rail_msgs_py"
+
+setup(
+    name=package_name,
+    version="0.1.0",
+    description="Typed views of standard messages, topic names and QoS profiles of the corridor.",
+    license="Apache-2.0",
+    maintainer="Rail Corridor maintainers",
+    maintainer_email="maintainers@rail-corridor.example",
+    packages=find_packages(include=[package_name, f"{package_name}.*"]),
+    package_data={package_name: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
+        (f"share/{package_name}", ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=False,
+)

@@ -1,0 +1,1 @@
+"""On-board equipment: the vehicle ranging station (VRS), a regenerative transponder."""

@@ -1,0 +1,1 @@
+"""Wayside equipment: wayside ranging stations (WRS) and zone controllers."""

@@ -1,0 +1,26 @@
+from setuptools import find_packages, setup
+
+package_name = "rail_world"
+
+setup(
+    name=package_name,
+    version="0.1.0",
+    description="The truth of the corridor: tracks, train motion, the radio medium and the tick.",
+    license="Apache-2.0",
+    maintainer="Rail Corridor maintainers",
+    maintainer_email="maintainers@rail-corridor.example",
+    packages=find_packages(include=[package_name, f"{package_name}.*"]),
+    package_data={package_name: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
+        (f"share/{package_name}", ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            "world = rail_world.world_node:main",
+            "radio_medium = rail_world.radio_medium_node:main",
+        ],
+    },
+)

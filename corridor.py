@@ -140,7 +140,7 @@ def run_pip(arguments: list[str]) -> None:
                     print(f"\r  {count} packages", end="", file=sys.stderr, flush=True)
                 elif count % 40 == 0:
                     print(f"  {count} packages", file=sys.stderr, flush=True)
-            elif line.startswith("Installing collected"):
+            elif count and line.startswith("Installing collected"):
                 end = "\n" if not on_terminal else ""
                 start = "\r" if on_terminal else ""
                 text = f"{start}  {count} packages collected, unpacking them"
@@ -178,8 +178,8 @@ def make_environment() -> None:
         last = (made.stdout.strip().splitlines() or ["no output"])[-1]
         raise SetupError(f"python -m venv failed: {last}")
     say("installing the packages of requirements.lock (once; a minute or two)")
-    # Modules are compiled when first imported: quicker than compiling all that is installed.
-    run_pip(["--no-compile", "--require-hashes", "-r", str(LOCK_FILE)])
+    # The lock file is complete, so there are no dependencies left to resolve.
+    run_pip(["--no-deps", "--require-hashes", "-r", str(LOCK_FILE)])
 
 
 def set_up() -> None:
@@ -217,7 +217,7 @@ def run_checks(pytest_arguments: list[str]) -> int:
             if subprocess.run(command, cwd=ROOT, env=env, check=False).returncode:
                 failed.append(name)
         # Tests marked `system` share one worker (tests/conftest.py), the rest fill the other.
-        pytest_arguments = ["-n", "2", "--dist", "loadgroup", "-q"]
+        pytest_arguments = ["-n", "2", "--dist", "loadgroup", "--timeout", "300", "-q"]
     print("== pytest", flush=True)
     command = [python, "-m", "pytest", *pytest_arguments]
     code = subprocess.run(command, cwd=ROOT, env=env, check=False).returncode

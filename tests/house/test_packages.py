@@ -1,0 +1,117 @@
+"""The pip distribution and the six ament packages say the same about themselves."""
+
+from __future__ import annotations
+
+import ast
+import configparser
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PYPROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")  # tomllib is Python 3.11
+PACKAGES = sorted(path.parent.name for path in (ROOT / "src").glob("*/package.xml"))
+NODES = {
+    "rail_world": {
+        "world": "rail_world.world_node:main",
+        "radio_medium": "rail_world.radio_medium_node:main",
+    },
+    "rail_wayside": {
+        "wrs": "rail_wayside.wrs_node:main",
+        "zone_controller": "rail_wayside.zone_controller_node:main",
+    },
+    "rail_onboard": {"vrs": "rail_onboard.vrs_node:main"},
+    "rail_corridor": {"rail": "rail_corridor.cli:main"},
+}
+
+
+def project_value(key: str) -> str:
+    """Return a plain string value of the [project] table."""
+    match = re.search(rf'^{key} = "(.*)"$', PYPROJECT, re.MULTILINE)
+    assert match, key
+    return match[1]
+
+
+def setup_arguments(package: str) -> dict[str, ast.expr]:
+    """Return the keyword arguments of the setup() call of a package."""
+    tree = ast.parse((ROOT / "src" / package / "setup.py").read_text(encoding="utf-8"))
+    call = next(
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "setup"
+    )
+    return {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg}
+
+
+def entry_points(package: str) -> dict[str, str]:
+    """Return the console scripts a package installs, name to target."""
+    arguments = setup_arguments(package)
+    if "entry_points" not in arguments:
+        return {}
+    scripts = ast.literal_eval(arguments["entry_points"])["console_scripts"]
+    return {name.strip(): target.strip() for name, target in (s.split("=") for s in scripts)}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_version_licence_and_description_agree(package: str) -> None:
+    manifest = ET.parse(ROOT / "src" / package / "package.xml").getroot()
+    arguments = setup_arguments(package)
+    assert manifest.get("format") == "3"
+    assert manifest.findtext("name") == package
+    assert manifest.findtext("version") == project_value("version")
+    assert ast.literal_eval(arguments["version"]) == project_value("version")
+    assert manifest.findtext("license") == project_value("license")
+    assert ast.literal_eval(arguments["license"]) == project_value("license")
+    assert manifest.findtext("description") == ast.literal_eval(arguments["description"])
+    assert manifest.findtext("export/build_type") == "ament_python"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_ament_index_marker_scripts_directory_and_typing(package: str) -> None:
+    folder = ROOT / "src" / package
+    assert (folder / "resource" / package).is_file()
+    assert (folder / package / "py.typed").is_file()
+    config = configparser.ConfigParser()
+    config.read(folder / "setup.cfg")
+    assert config["develop"]["script_dir"] == f"$base/lib/{package}"
+    assert config["install"]["install_scripts"] == f"$base/lib/{package}"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_entry_points_name_functions_that_exist(package: str) -> None:
+    assert entry_points(package) == NODES.get(package, {})
+    for target in entry_points(package).values():
+        module, function = target.split(":")
+        path = ROOT / "src" / package / Path(*module.split(".")).with_suffix(".py")
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+        assert function in defined, f"{target}: no such function"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_manifest_depends_on_our_packages_that_are_imported(package: str) -> None:
+    manifest = ET.parse(ROOT / "src" / package / "package.xml").getroot()
+    declared = {e.text for e in manifest.findall("exec_depend") if e.text in PACKAGES}
+    imported = set()
+    for path in (ROOT / "src" / package / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and not node.level:
+                names = [node.module or ""]
+            imported |= {name.partition(".")[0] for name in names}
+    assert imported & set(PACKAGES) - {package} <= declared
+
+
+def test_pyproject_maps_every_package_and_the_command() -> None:
+    for package in PACKAGES:
+        assert f'{package} = "src/{package}/{package}"' in PYPROJECT
+    assert 'rail = "rail_corridor.cli:main"' in PYPROJECT
+
+
+def test_workspace_source_is_a_relative_link() -> None:
+    link = ROOT / "ros2_ws" / "src"
+    assert link.is_symlink()
+    assert link.readlink() == Path("../src")
+    assert link.resolve() == ROOT / "src"

@@ -32,7 +32,7 @@ def false_alarm_probability(
 
     Notes
     -----
-    ``P <= I(1 - b; M - L, L) + W sqrt(2 b (1 - b) lambda / (2 pi (M - L))) p(b)`` with
+    ``P <= I(1 - b; M - L, L) + W sqrt(b (1 - b) lambda / (pi (M - L))) p(b)`` with
     ``lambda = (2 pi T)^2 / 12``, the second moment of time over the block, and p the
     density of Beta(L, M - L); tight where P is small.
     """
@@ -42,7 +42,7 @@ def false_alarm_probability(
         (lines - 1) * math.log(share) + (rest - 1) * math.log1p(-share) - betaln(lines, rest)
     )
     spread = (2 * math.pi * duration_s) ** 2 / 12
-    rate = math.sqrt(2 * share * (1 - share) * spread / (2 * math.pi * rest)) * math.exp(log_density)
+    rate = math.sqrt(share * (1 - share) * spread / (math.pi * rest)) * math.exp(log_density)
     return tail + search_hz * rate
 
 

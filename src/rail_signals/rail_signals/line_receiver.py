@@ -22,18 +22,16 @@ from rail_signals.ranging_signal import (
     FloatArray,
     RangingSignal,
     _as_bursts,
-    modulate,
-    wrap_to_turn,
 )
 
 MAX_SNR = 1e9
-"""Ceiling of the estimated carrier-to-noise ratio (90 dB): the lines left out of the
-model are this small, so nothing better can be told."""
+"""Ceiling of the estimated carrier-to-noise ratio (90 dB), where aliased and overlapping
+lines of the order of 1e-9 of the power begin to matter."""
 
 _STRONG_SHARE = 0.92
-_SEGMENT_CYCLES = 0.1
+_SEGMENT_CYCLES = 0.25
 _DIRECT_PERIOD = 64
-_CHUNK_SAMPLES = 1 << 17
+_CHUNK_SAMPLES = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -75,14 +73,14 @@ class ToneEstimate:
 class LineReceiver:
     """Maximum-likelihood receiver of a `RangingSignal` in white noise.
 
-    1. Fold: samples a period apart are added while the offset allows it.
-    2. Offset: the strong lines of each fold, correlated with a grid of frequencies half
-       a cycle per burst apart; the largest sum of squares is interpolated (Aboutanios
-       and Mulgrew, IEEE Trans. Signal Processing 53(4), 2005, with all lines in one
-       quotient).
-    3. Lines: folds are turned back by the offset, about the middle of the burst, where
-       the phases of carrier and tones do not depend on its error, and summed.
-    4. Phases: products of neighbouring lines start two Gauss-Newton steps on complex
+    1. Offset: the strong lines of short segments, correlated with a grid of frequencies
+       half a cycle per burst apart; the largest sum of squares is interpolated
+       (Aboutanios and Mulgrew, IEEE Trans. Signal Processing 53(4), 2005, with all lines
+       in one quotient).
+    2. Fold: the burst is turned back by the offset, about its middle, where the phases of
+       carrier and tones do not depend on the offset's error, and its periods are added.
+       The transform of the sum holds every line; what is left of the energy is noise.
+    3. Phases: products of neighbouring lines start two Gauss-Newton steps on complex
        amplitude and tone phases; the symmetry of the lines makes the normal matrix
        diagonal.
 
@@ -95,8 +93,14 @@ class LineReceiver:
     false_alarm
         Probability that noise alone counts as detected, per burst.
 
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range for the signal; the message quotes it.
+
     Examples
     --------
+    >>> from rail_signals.ranging_signal import modulate
     >>> receiver = LineReceiver(RangingSignal())
     >>> found = receiver.estimate(modulate(RangingSignal(), [[0.5], [4.0]]))
     >>> found.phase_lag_rad.ravel().round(9).tolist(), found.detected.tolist()
@@ -107,43 +111,39 @@ class LineReceiver:
         self, signal: RangingSignal, *, max_offset_hz: float = 5e3, false_alarm: float = 1e-6
     ) -> None:
         if not (math.isfinite(max_offset_hz) and max_offset_hz >= 0):
-            raise ValueError(f"max_offset_hz must be finite and not negative, got {max_offset_hz!r}")
+            raise ValueError(
+                f"max_offset_hz must be finite and not negative, got {max_offset_hz!r}"
+            )
         self.signal = signal
-        period, rate_hz = signal.period_samples, signal.sample_rate_hz
-        periods = signal.samples // period
-        self._fold = _fold_length(periods, max_offset_hz * period / rate_hz)
-        self._segments = periods // self._fold
+        self._period = signal.period_samples
+        self._periods = signal.samples // self._period
+        if self._periods < 2:
+            raise ValueError(
+                f"samples must hold two periods of {self._period} or more, got {signal.samples}"
+            )
         lines = line_spectrum(signal)
         strong = lines.strongest(_STRONG_SHARE)
         self._init_lines(lines, strong)
-        self._init_offsets(max_offset_hz, strong)
-        grid = self._grid_hz
+        search_hz = self._init_offsets(max_offset_hz, strong) if max_offset_hz > 0 else 0.0
+        self._search = max_offset_hz > 0
         self._threshold = detection_share(
-            false_alarm,
-            len(strong.bins),
-            self._segments * period,
-            float(grid[-1] - grid[0]),
-            signal.duration_s,
+            false_alarm, len(strong.bins), signal.samples, search_hz, signal.duration_s
         )
 
     def _init_lines(self, lines: LineSpectrum, strong: LineSpectrum) -> None:
-        """Tables of the line fit: bases, products of neighbours, Gauss-Newton rows."""
-        period = self.signal.period_samples
+        """Tables of the line fit: basis, products of neighbours, Gauss-Newton rows."""
         self._bins = lines.bins
-        self._basis = _real_basis(lines.bins, period)
-        self._strong_basis = _real_basis(strong.bins, period)
-        where = {tuple(o): i for i, o in enumerate(lines.orders.tolist())}
-        self._strong = np.array([where[tuple(o)] for o in strong.orders.tolist()])
+        self._basis = _real_basis(lines.bins, self._period)
+        where = {tuple(order): i for i, order in enumerate(lines.orders.tolist())}
         tones = lines.orders.shape[1]
         pairs: list[tuple[int, int, int]] = []
         for tone in range(tones):
-            step = tuple(int(t == tone) for t in range(tones))
             for order, upper in where.items():
-                lower = where.get(tuple(o - s for o, s in zip(order, step, strict=True)))
+                lower = where.get((*order[:tone], order[tone] - 1, *order[tone + 1 :]))
                 if lower is not None:
                     pairs.append((upper, lower, tone))
-        self._upper = np.array([p[0] for p in pairs])
-        self._lower = np.array([p[1] for p in pairs])
+        self._upper = np.array([pair[0] for pair in pairs])
+        self._lower = np.array([pair[1] for pair in pairs])
         self._pair_weights = np.zeros((len(pairs), tones), dtype=np.complex128)
         for row, (upper, lower, tone) in enumerate(pairs):
             self._pair_weights[row, tone] = lines.amplitudes[upper] * lines.amplitudes[lower]
@@ -151,39 +151,50 @@ class LineReceiver:
         self._power = lines.power
         self._information = lines.information
         rows = [lines.amplitudes / lines.power]
-        rows += [
-            lines.orders[:, t] * lines.amplitudes / self._information[t] for t in range(tones)
-        ]
+        rows += [lines.orders[:, t] * lines.amplitudes / self._information[t] for t in range(tones)]
         self._fit = np.stack(rows, axis=-1).astype(np.complex128)
         self._free = len(lines.bins) - 1 - tones / 2
+        strong_orders = {tuple(order) for order in strong.orders.tolist()}
+        is_strong = [float(order in strong_orders) for order in where]
+        self._sums = np.repeat(np.stack([np.ones(len(where)), is_strong], axis=-1), 2, axis=0)
 
-    def _init_offsets(self, max_offset_hz: float, strong: LineSpectrum) -> None:
-        """Tables of the offset search: grid, its phasors, and the times of the folds."""
-        period, rate_hz = self.signal.period_samples, self.signal.sample_rate_hz
-        segment_s = self._fold * period / rate_hz
-        if max_offset_hz > 0:
-            if self._segments < 2 or max_offset_hz * segment_s > 0.45:
-                raise ValueError(
-                    f"max_offset_hz must stay below {0.45 * rate_hz / period:g} Hz for periods of"
-                    f" {period} samples, at least two of them in samples"
-                    f" ({self.signal.samples}), got {max_offset_hz:g}"
-                )
-            step_hz = 0.5 / self.signal.duration_s
-            half = math.ceil(max_offset_hz / step_hz)
-            self._grid_hz = step_hz * np.arange(-half - 1, half + 2)
-        else:
-            self._grid_hz = np.zeros(1)
-        self._search = max_offset_hz > 0
-        centre = np.arange(self._segments) - (self._segments - 1) / 2
-        within = np.arange(period) - (period - 1) / 2
-        turn = -2j * math.pi
-        self._grid = np.exp(turn * self._grid_hz[:, None] * centre * segment_s)
-        self._ramp = turn * np.concatenate([centre * segment_s, within / rate_hz])
-        repeat = (np.arange(self._fold) - (self._fold - 1) / 2) * period / rate_hz
-        self._repeat_turn = 2 * math.pi * repeat
-        # The interpolation formula of `_offsets` for K segments.
-        self._arc = math.tan(math.pi / (2 * self._segments))
-        self._arc_hz = self._segments / math.pi / self.signal.duration_s
+    def _init_offsets(self, max_offset_hz: float, strong: LineSpectrum) -> float:
+        """Tables of the offset search; returns the width of its interval [Hz]."""
+        period, rate_hz = self._period, self.signal.sample_rate_hz
+        limit_hz = 0.45 * rate_hz / period
+        if max_offset_hz > limit_hz:
+            raise ValueError(
+                f"max_offset_hz must stay below {limit_hz:g} Hz for periods of"
+                f" {period} samples, got {max_offset_hz:g}"
+            )
+        repeats = _segment_periods(self._periods, max_offset_hz * period / rate_hz)
+        segments = self._periods // repeats
+        segment_s = repeats * period / rate_hz
+        self._segments = segments
+        # Each segment is one row of samples, so the basis repeats with the period.
+        self._strong_basis = np.tile(_real_basis(strong.bins, period), (repeats, 1))
+        step_hz = 0.5 / self.signal.duration_s
+        half = math.ceil(max_offset_hz / step_hz) + 1
+        self._grid_hz = step_hz * np.arange(-half, half + 1)
+        centre_s = (np.arange(segments) - (segments - 1) / 2) * segment_s
+        turn = 2 * math.pi * self._grid_hz[:, None] * centre_s
+        self._grid = np.concatenate([np.cos(turn), np.sin(turn)])
+        # The interpolation formula of `_offsets` for this number of segments.
+        self._arc = math.tan(math.pi / (2 * segments))
+        self._arc_hz = segments / math.pi / self.signal.duration_s
+        # The time of a sample about the middle is a sum of four terms, so its phasor is
+        # a product of entries of four short tables.
+        fine = max(d for d in range(1, math.isqrt(period) + 1) if period % d == 0)
+        self._split = np.cumsum([segments, repeats, period // fine])
+        steps = (
+            (segments, repeats * period),
+            (repeats, period),
+            (period // fine, fine),
+            (fine, 1),
+        )
+        times = [(np.arange(count) - (count - 1) / 2) * step / rate_hz for count, step in steps]
+        self._ramp = -2j * math.pi * np.concatenate(times)
+        return float(self._grid_hz[-1] - self._grid_hz[0])
 
     def estimate(self, bursts: ArrayLike) -> ToneEstimate:
         """Estimate tone phases, offset, amplitude and noise of each burst.
@@ -203,6 +214,7 @@ class LineReceiver:
         x = np.ascontiguousarray(_as_bursts(self.signal, bursts))
         lead = x.shape[:-1]
         x = x.reshape(-1, self.signal.samples)
+        # Pieces that stay in the processor's cache.
         chunk = max(1, _CHUNK_SAMPLES // self.signal.samples)
         with np.errstate(all="ignore"):
             if len(x) <= chunk:
@@ -220,108 +232,97 @@ class LineReceiver:
 
     def _estimate(self, x: ComplexArray) -> tuple[NDArray[Any], ...]:
         """Fields of `ToneEstimate` for bursts [batch, samples]."""
-        period, segments, fold = self.signal.period_samples, self._segments, self._fold
-        folds = self._folded(x)
-        plain = folds.reshape(len(x), -1).view(np.float64)
-        energy = _row_dot(plain, plain) / fold
-        offset_hz = self._offsets(folds) if self._search else np.zeros(len(x))
-        lines, gain = self._lines(folds, offset_hz)
+        samples, period = self.signal.samples, self._period
+        parts = x.view(np.float64)
+        energy = _row_dot(parts, parts)
+        offset_hz = self._offsets(x) if self._search else np.zeros(len(x))
+        folded = self._folded(x, offset_hz)
+        lines = self._lines(folded)
         phase, amplitude = self._fit_phases(lines)
 
-        # In units of energy per complex dimension of the folds.
-        scale = gain * gain * (segments * period * fold)
-        power = (amplitude * amplitude.conj()).real
-        parts = lines.view(np.float64)
-        on_lines = _row_dot(parts, parts)
-        strong = lines.take(self._strong, axis=1).view(np.float64)
-        share = _row_dot(strong, strong) * scale / energy
-        outside = energy - scale * (on_lines + (1 - self._power) * power)
-        noise = np.maximum(outside / (segments * period - len(self._bins)), power / MAX_SNR)
+        parts = folded.view(np.float64)
+        # Every line is in the folded period, so the energy outside it is noise.
+        outside = energy - _row_dot(parts, parts) / self._periods
+        power = amplitude.real**2 + amplitude.imag**2
+        noise = np.maximum(outside / (samples - period), power / MAX_SNR)
         snr = power / noise
-        variance = 0.5 / ((snr * scale)[:, None] * self._information)
-        misfit = (on_lines - self._power * power) * scale / (self._free * noise)
-        detected = (share > self._threshold) & np.isfinite(energy)
-        result = (
-            wrap_to_turn(phase),
-            variance,
-            np.sqrt(power),
-            snr,
-            offset_hz,
-            misfit,
-            detected,
-        )
+        variance = (0.5 / samples) / (snr[:, None] * self._information)
+        parts = lines.view(np.float64)
+        sums = ((parts * parts)[:, None] @ self._sums)[:, 0]
+        misfit = (sums[:, 0] - self._power * power) * (samples / self._free) / noise
+        detected = sums[:, 1] * samples > self._threshold * energy
+        # Twice: the remainder of a tiny negative phase rounds to a full turn.
+        phase %= 2 * math.pi
+        phase %= 2 * math.pi
+        result = (phase, variance, np.sqrt(power), snr, offset_hz, misfit, detected)
         if not detected.all():
-            missed = ~detected
-            for field, value in zip(
-                result[:-1], (np.nan, np.inf, 0.0, 0.0, np.nan, np.nan), strict=True
-            ):
-                field[missed] = value
+            for field, value in zip(result, _MISSED, strict=False):
+                field[~detected] = value
         return result
 
-    def _folded(self, x: ComplexArray) -> ComplexArray:
-        """Bursts [batch, samples] as sums of whole periods [batch, segments, period]."""
-        shape = (len(x), self._segments, self._fold, self.signal.period_samples)
-        repeats = x.reshape(shape)
-        if self._fold == 1:
-            return repeats[:, :, 0]
-        total = repeats[:, :, 0] + repeats[:, :, 1]
-        for i in range(2, self._fold):
-            total += repeats[:, :, i]
-        return total
-
-    def _offsets(self, folds: ComplexArray) -> FloatArray:
+    def _offsets(self, x: ComplexArray) -> FloatArray:
         """Carrier offset [Hz] of each burst."""
         # Matrix products are stacked, one of fixed shape for each burst, so that their
         # rounding does not depend on the batch.
-        lines = (folds.view(np.float64) @ self._strong_basis).view(np.complex128)
-        response = self._grid @ lines
+        rows = x.view(np.float64).reshape(len(x), self._segments, -1)
+        both = (self._grid @ (rows @ self._strong_basis)).view(np.complex128)
+        count = len(self._grid_hz)
+        response = both[:, :count] - 1j * both[:, count:]
         parts = response.view(np.float64)
         peak = _row_dot(parts, parts)[:, 1:-1].argmax(axis=-1) + 1
-        row = np.arange(len(folds))
-        above, below = response[row, peak + 1], response[row, peak - 1]
-        plus, minus = (above + below).view(np.float64), (above - below).view(np.float64)
-        quotient = _row_dot(plus, minus) / _row_dot(plus, plus)
+        row = np.arange(len(x))
+        above, below = parts[row, peak + 1], parts[row, peak - 1]
+        total = above + below
+        quotient = _row_dot(above - below, total) / _row_dot(total, total)
         return np.asarray(self._grid_hz[peak] + np.arctan(quotient * self._arc) * self._arc_hz)
 
-    def _lines(
-        self, folds: ComplexArray, offset_hz: FloatArray
-    ) -> tuple[ComplexArray, FloatArray]:
-        """Lines [batch, lines] of a wave without offset, and the gain of the folds."""
-        segments, period = self._segments, self.signal.period_samples
-        turn = np.exp(offset_hz[:, None] * self._ramp)
-        summed = (turn[:, None, :segments] @ folds)[:, 0]
-        summed *= turn[:, segments:]
-        gain = np.ones(len(folds))
-        if self._fold > 1:
-            gain = np.cos(offset_hz[:, None] * self._repeat_turn).sum(axis=-1) / self._fold
-        if period <= _DIRECT_PERIOD:
-            parts = summed.view(np.float64)[:, None] @ self._basis
+    def _folded(self, x: ComplexArray, offset_hz: FloatArray) -> ComplexArray:
+        """Sum of the periods [batch, period] after turning back by the offset."""
+        batch, periods, period = len(x), self._periods, self._period
+        rows = x.reshape(batch, periods, period)
+        if not self._search:
+            return np.asarray(np.ones((1, periods), dtype=np.complex128) @ rows)[:, 0]
+        table = np.exp(offset_hz[:, None] * self._ramp)
+        i, j, k = self._split
+        per_period = (table[:, :i, None] * table[:, None, i:j]).reshape(batch, 1, periods)
+        within = (table[:, j:k, None] * table[:, None, k:]).reshape(batch, period)
+        within *= (per_period @ rows)[:, 0]
+        return within
+
+    def _lines(self, folded: ComplexArray) -> ComplexArray:
+        """Lines [batch, lines] of the folded period [batch, period]."""
+        if self._period <= _DIRECT_PERIOD:
+            parts = folded.view(np.float64)[:, None] @ self._basis
             lines = parts.view(np.complex128)[:, 0]
         else:
-            lines = np.fft.fft(summed).take(self._bins, axis=1) / period
-        lines /= (gain * (segments * self._fold))[:, None]
-        return lines, gain
+            lines = np.fft.fft(folded).take(self._bins, axis=1)
+            lines *= 1 / self._period
+        lines *= 1 / self._periods
+        return lines
 
     def _fit_phases(self, lines: ComplexArray) -> tuple[FloatArray, ComplexArray]:
         """Tone phases [batch, tones] and complex amplitude [batch] by Gauss-Newton."""
-        products = lines.take(self._upper, axis=1) * lines.take(self._lower, axis=1).conj()
-        phase = -np.angle(products[:, None] @ self._pair_weights)
+        products = lines.conj().take(self._upper, axis=1)
+        products *= lines.take(self._lower, axis=1)
+        start = products[:, None] @ self._pair_weights
+        phase = np.arctan2(start.imag, start.real)
         column = lines[:, None]
         for _ in range(2):
             fit = (column * np.exp(phase @ self._turns)) @ self._fit
-            amplitude = fit[..., 0]
             phase -= (fit[..., 1:] / fit[..., :1]).imag
-        return phase[:, 0], amplitude[:, 0]
+        return phase[:, 0], fit[:, 0, 0]
 
 
-def _fold_length(periods: int, cycles_per_period: float) -> int:
-    """Periods to add up: a divisor that loses little to the offset and leaves 8 folds."""
+_MISSED = (np.nan, np.inf, 0.0, 0.0, np.nan, np.nan)
+"""Fields of `ToneEstimate`, up to `misfit`, of a burst in which nothing was found."""
+
+
+def _segment_periods(periods: int, cycles_per_period: float) -> int:
+    """Periods in a segment: a divisor that the offset turns little, with two segments left."""
     fits = [
-        fold
-        for fold in range(1, periods + 1)
-        if periods % fold == 0
-        and fold * cycles_per_period <= _SEGMENT_CYCLES
-        and periods // fold >= min(periods, 8)
+        count
+        for count in range(1, periods // 2 + 1)
+        if periods % count == 0 and count * cycles_per_period <= _SEGMENT_CYCLES
     ]
     return max(fits, default=1)
 

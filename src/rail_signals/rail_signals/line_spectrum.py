@@ -53,7 +53,7 @@ class LineSpectrum:
         return np.asarray((self.orders**2).T @ self.amplitudes**2)
 
     def strongest(self, share: float) -> LineSpectrum:
-        """The fewest lines that carry `share` of the power of these, by whole ties."""
+        """Return the fewest lines that carry `share` of the power of these, ties whole."""
         power = self.amplitudes**2
         keep = power >= _tie(_cut(power, share * power.sum()))
         return LineSpectrum(self.orders[keep], self.bins[keep], self.amplitudes[keep])
@@ -97,7 +97,7 @@ def _cut(values: FloatArray, enough: float) -> float:
 
 
 def _tie(value: float) -> float:
-    """A shade below, so that mirrored lines, equal but for rounding, stay together."""
+    """Lower a cut by a shade: mirrored lines, equal but for rounding, stay together."""
     return value * (1 - 1e-9)
 
 

@@ -97,9 +97,10 @@ def _displacement(k0: FloatArray, c: FloatArray, s: FloatArray) -> npt.NDArray[n
     if not bent.any():
         return result
     k0, c, s = k0[bent], c[bent], s[bent]
-    scale = np.sqrt(np.pi / np.abs(c))
     # Rounding of the large phase kappa0^2 / 2c, and cancellation of values near one half.
-    error = np.finfo(np.float64).eps * scale * (1.0 + 0.5 * k0 * k0 / np.abs(c))
+    with np.errstate(over="ignore"):  # infinite for the smallest rates: not the Fresnel form
+        scale = np.sqrt(np.pi / np.abs(c))
+        error = np.finfo(np.float64).eps * scale * (1.0 + 0.5 * k0 * k0 / np.abs(c))
     well = error < _FRESNEL_ERROR_M
     values = np.empty(s.shape, dtype=np.complex128)
     values[well] = _clothoid(k0[well], c[well], s[well])

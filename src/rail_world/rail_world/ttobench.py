@@ -208,9 +208,8 @@ def _no_constant(text: str) -> float:
 def _read_json(path: Path) -> object:
     file = str(path)
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise WorldDataError("(file)", path.stat().st_size, "bytes, too large", file=file)
-        text = path.read_text(encoding="utf-8")
+        size = path.stat().st_size
+        text = path.read_text(encoding="utf-8") if size <= _LARGEST_FILE else ""
     except OSError as error:
         reason = error.strerror or "cannot be read"
         raise WorldDataError("(file)", path.name, reason, file=file) from None
@@ -218,6 +217,8 @@ def _read_json(path: Path) -> object:
         raise WorldDataError("(file)", path.name, "is not UTF-8 text", file=file) from None
     except ValueError:  # a null byte in the name
         raise WorldDataError("(file)", file, "is no file name") from None
+    if size > _LARGEST_FILE:
+        raise WorldDataError("(file)", size, "bytes are too large for a track", file=file)
     try:
         return json.loads(text, object_pairs_hook=_no_duplicates, parse_constant=_no_constant)
     except WorldDataError as error:

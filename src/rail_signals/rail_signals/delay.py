@@ -32,7 +32,7 @@ def fractional_delay(blocks: ArrayLike, delay_s: ArrayLike, sample_rate_hz: floa
 
     Examples
     --------
-    >>> fractional_delay([1.0, 0.0, 0.0, 0.0], 0.5, 4.0).round(12).real.tolist()
+    >>> abs(fractional_delay([1.0, 0.0, 0.0, 0.0], 0.5, 4.0)).round(12).tolist()
     [0.0, 0.0, 1.0, 0.0]
     """
     x = np.asarray(blocks, dtype=np.complex128)

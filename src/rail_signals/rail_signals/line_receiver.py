@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rail_signals.line_detector import detection_share
 from rail_signals.line_spectrum import LineSpectrum, line_spectrum
+from rail_signals.offset_search import OffsetSearch, row_dot
 from rail_signals.ranging_signal import (
     ComplexArray,
     FloatArray,
@@ -29,7 +30,6 @@ MAX_SNR = 1e9
 lines of the order of 1e-9 of the power begin to matter."""
 
 _STRONG_SHARE = 0.92
-_SEGMENT_CYCLES = 0.25
 _DIRECT_PERIOD = 64
 _CHUNK_SAMPLES = 1 << 15
 
@@ -121,11 +121,12 @@ class LineReceiver:
             raise ValueError(
                 f"samples must hold two periods of {self._period} or more, got {signal.samples}"
             )
+        self._ones = np.ones((1, self._periods), dtype=np.complex128)
         lines = line_spectrum(signal)
         strong = lines.strongest(_STRONG_SHARE)
         self._init_lines(lines, strong)
-        search_hz = self._init_offsets(max_offset_hz, strong) if max_offset_hz > 0 else 0.0
-        self._search = max_offset_hz > 0
+        self._search = OffsetSearch(signal, strong, max_offset_hz) if max_offset_hz > 0 else None
+        search_hz = self._search.width_hz if self._search else 0.0
         self._threshold = detection_share(
             false_alarm, len(strong.bins), signal.samples, search_hz, signal.duration_s
         )
@@ -133,7 +134,7 @@ class LineReceiver:
     def _init_lines(self, lines: LineSpectrum, strong: LineSpectrum) -> None:
         """Tables of the line fit: basis, products of neighbours, Gauss-Newton rows."""
         self._bins = lines.bins
-        self._basis = _real_basis(lines.bins, self._period)
+        self._basis = lines.real_basis(self._period)
         where = {tuple(order): i for i, order in enumerate(lines.orders.tolist())}
         tones = lines.orders.shape[1]
         pairs: list[tuple[int, int, int]] = []
@@ -157,44 +158,6 @@ class LineReceiver:
         strong_orders = {tuple(order) for order in strong.orders.tolist()}
         is_strong = [float(order in strong_orders) for order in where]
         self._sums = np.repeat(np.stack([np.ones(len(where)), is_strong], axis=-1), 2, axis=0)
-
-    def _init_offsets(self, max_offset_hz: float, strong: LineSpectrum) -> float:
-        """Tables of the offset search; returns the width of its interval [Hz]."""
-        period, rate_hz = self._period, self.signal.sample_rate_hz
-        limit_hz = 0.45 * rate_hz / period
-        if max_offset_hz > limit_hz:
-            raise ValueError(
-                f"max_offset_hz must stay below {limit_hz:g} Hz for periods of"
-                f" {period} samples, got {max_offset_hz:g}"
-            )
-        repeats = _segment_periods(self._periods, max_offset_hz * period / rate_hz)
-        segments = self._periods // repeats
-        segment_s = repeats * period / rate_hz
-        self._segments = segments
-        # Each segment is one row of samples, so the basis repeats with the period.
-        self._strong_basis = np.tile(_real_basis(strong.bins, period), (repeats, 1))
-        step_hz = 0.5 / self.signal.duration_s
-        half = math.ceil(max_offset_hz / step_hz) + 1
-        self._grid_hz = step_hz * np.arange(-half, half + 1)
-        centre_s = (np.arange(segments) - (segments - 1) / 2) * segment_s
-        turn = 2 * math.pi * self._grid_hz[:, None] * centre_s
-        self._grid = np.concatenate([np.cos(turn), np.sin(turn)])
-        # The interpolation formula of `_offsets` for this number of segments.
-        self._arc = math.tan(math.pi / (2 * segments))
-        self._arc_hz = segments / math.pi / self.signal.duration_s
-        # The time of a sample about the middle is a sum of four terms, so its phasor is
-        # a product of entries of four short tables.
-        fine = max(d for d in range(1, math.isqrt(period) + 1) if period % d == 0)
-        self._split = np.cumsum([segments, repeats, period // fine])
-        steps = (
-            (segments, repeats * period),
-            (repeats, period),
-            (period // fine, fine),
-            (fine, 1),
-        )
-        times = [(np.arange(count) - (count - 1) / 2) * step / rate_hz for count, step in steps]
-        self._ramp = -2j * math.pi * np.concatenate(times)
-        return float(self._grid_hz[-1] - self._grid_hz[0])
 
     def estimate(self, bursts: ArrayLike) -> ToneEstimate:
         """Estimate tone phases, offset, amplitude and noise of each burst.
@@ -234,15 +197,19 @@ class LineReceiver:
         """Fields of `ToneEstimate` for bursts [batch, samples]."""
         samples, period = self.signal.samples, self._period
         parts = x.view(np.float64)
-        energy = _row_dot(parts, parts)
-        offset_hz = self._offsets(x) if self._search else np.zeros(len(x))
-        folded = self._folded(x, offset_hz)
+        energy = row_dot(parts, parts)
+        if self._search:
+            offset_hz = self._search.offset_hz(x)
+            folded = self._search.fold(x, offset_hz)
+        else:
+            offset_hz = np.zeros(len(x))
+            folded = (self._ones @ x.reshape(len(x), self._periods, self._period))[:, 0]
         lines = self._lines(folded)
         phase, amplitude = self._fit_phases(lines)
 
         parts = folded.view(np.float64)
         # Every line is in the folded period, so the energy outside it is noise.
-        outside = energy - _row_dot(parts, parts) / self._periods
+        outside = energy - row_dot(parts, parts) / self._periods
         power = amplitude.real**2 + amplitude.imag**2
         noise = np.maximum(outside / (samples - period), power / MAX_SNR)
         snr = power / noise
@@ -259,35 +226,6 @@ class LineReceiver:
             for field, value in zip(result, _MISSED, strict=False):
                 field[~detected] = value
         return result
-
-    def _offsets(self, x: ComplexArray) -> FloatArray:
-        """Carrier offset [Hz] of each burst."""
-        # Matrix products are stacked, one of fixed shape for each burst, so that their
-        # rounding does not depend on the batch.
-        rows = x.view(np.float64).reshape(len(x), self._segments, -1)
-        both = (self._grid @ (rows @ self._strong_basis)).view(np.complex128)
-        count = len(self._grid_hz)
-        response = both[:, :count] - 1j * both[:, count:]
-        parts = response.view(np.float64)
-        peak = _row_dot(parts, parts)[:, 1:-1].argmax(axis=-1) + 1
-        row = np.arange(len(x))
-        above, below = parts[row, peak + 1], parts[row, peak - 1]
-        total = above + below
-        quotient = _row_dot(above - below, total) / _row_dot(total, total)
-        return np.asarray(self._grid_hz[peak] + np.arctan(quotient * self._arc) * self._arc_hz)
-
-    def _folded(self, x: ComplexArray, offset_hz: FloatArray) -> ComplexArray:
-        """Sum of the periods [batch, period] after turning back by the offset."""
-        batch, periods, period = len(x), self._periods, self._period
-        rows = x.reshape(batch, periods, period)
-        if not self._search:
-            return np.asarray(np.ones((1, periods), dtype=np.complex128) @ rows)[:, 0]
-        table = np.exp(offset_hz[:, None] * self._ramp)
-        i, j, k = self._split
-        per_period = (table[:, :i, None] * table[:, None, i:j]).reshape(batch, 1, periods)
-        within = (table[:, j:k, None] * table[:, None, k:]).reshape(batch, period)
-        within *= (per_period @ rows)[:, 0]
-        return within
 
     def _lines(self, folded: ComplexArray) -> ComplexArray:
         """Lines [batch, lines] of the folded period [batch, period]."""
@@ -315,31 +253,3 @@ class LineReceiver:
 
 _MISSED = (np.nan, np.inf, 0.0, 0.0, np.nan, np.nan)
 """Fields of `ToneEstimate`, up to `misfit`, of a burst in which nothing was found."""
-
-
-def _segment_periods(periods: int, cycles_per_period: float) -> int:
-    """Periods in a segment: a divisor that the offset turns little, with two segments left."""
-    fits = [
-        count
-        for count in range(1, periods // 2 + 1)
-        if periods % count == 0 and count * cycles_per_period <= _SEGMENT_CYCLES
-    ]
-    return max(fits, default=1)
-
-
-def _real_basis(bins: NDArray[np.int64], period: int) -> FloatArray:
-    """Matrix from folds to lines, both as interleaved real and imaginary parts.
-
-    Real products are faster here than complex ones, half of whose work is zero.
-    """
-    turn = 2 * math.pi / period * (np.outer(np.arange(period), bins) % period)
-    basis = np.empty((period, 2, len(bins), 2))
-    basis[:, 0, :, 0] = basis[:, 1, :, 1] = np.cos(turn) / period
-    basis[:, 1, :, 0] = np.sin(turn) / period
-    basis[:, 0, :, 1] = -basis[:, 1, :, 0]
-    return basis.reshape(2 * period, 2 * len(bins))
-
-
-def _row_dot(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Inner product along the last axis."""
-    return np.asarray(np.vecdot(left, right))

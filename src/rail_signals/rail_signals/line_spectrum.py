@@ -7,6 +7,7 @@ order of a line is the factor by which it magnifies the lag of the tone.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +58,19 @@ class LineSpectrum:
         power = self.amplitudes**2
         keep = power >= _tie(_cut(power, share * power.sum()))
         return LineSpectrum(self.orders[keep], self.bins[keep], self.amplitudes[keep])
+
+    def real_basis(self, period: int) -> FloatArray:
+        """Matrix [2 * period, 2 L] from a period of samples to its lines.
+
+        Both are rows of interleaved real and imaginary parts: a real product of this size
+        is faster than the complex one. Scaled by ``1 / period``.
+        """
+        turn = 2 * math.pi / period * (np.outer(np.arange(period), self.bins) % period)
+        basis = np.empty((period, 2, len(self.bins), 2))
+        basis[:, 0, :, 0] = basis[:, 1, :, 1] = np.cos(turn) / period
+        basis[:, 1, :, 0] = np.sin(turn) / period
+        basis[:, 0, :, 1] = -basis[:, 1, :, 0]
+        return basis.reshape(2 * period, 2 * len(self.bins))
 
 
 def line_spectrum(signal: RangingSignal) -> LineSpectrum:

@@ -11,7 +11,6 @@ from rail_world.driver import (
     BrakingEnvelope,
     limits_for_train,
     nearest_ahead,
-    planned_deceleration_mps2,
 )
 from rail_world.profile import StepProfile
 from rail_world.vehicle import Extent
@@ -105,11 +104,6 @@ def test_a_step_never_ends_above_the_envelope(
         v = after
         assert v <= envelope.speed_mps(s) + 1e-9
         assert v**2 <= 2 * braking_mps2 * (stop_s - s) + 1e-9
-
-
-def test_slopes_take_from_the_planned_braking() -> None:
-    assert planned_deceleration_mps2(1.0, 9.0, 0.0, 0.8) == 0.8
-    assert planned_deceleration_mps2(1.0, 9.0, 0.1, 0.8) == pytest.approx(0.1)
 
 
 def test_nearest_ahead() -> None:

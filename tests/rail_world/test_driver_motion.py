@@ -7,8 +7,9 @@ import pytest
 from pydantic import ValidationError
 
 from rail_world.description import JunctionDescription, TrackDescription, TrainDescription
+from rail_world.drive_command import DriveCommand
 from rail_world.errors import WorldDataError
-from rail_world.motion import DriveCommand, TrainMotion
+from rail_world.motion import TrainMotion
 from rail_world.network import Network, build_network
 
 # No resistance at all, and power without end: constant accelerations.
@@ -329,6 +330,59 @@ def test_trains_that_do_not_fit_are_refused(
 def test_train_that_could_not_hold_the_slope_is_refused() -> None:
     with pytest.raises(WorldDataError, match="too weak for a slope of 110 per mille"):
         train(line(gradients=[[0.0, -110.0]]))
+
+
+def test_slopes_take_from_the_planned_braking() -> None:
+    assert train().planned_deceleration_mps2 == pytest.approx(0.8)
+    steep = train(line(gradients=[[0.0, 60.0]]))
+    assert steep.planned_deceleration_mps2 == pytest.approx(1.0 - 9.80665 * 0.060)
+
+
+@pytest.mark.parametrize("gradient_permil", [-60.0, 60.0])
+def test_stops_exactly_on_steep_slopes(gradient_permil: float) -> None:
+    network = line(3000.0, gradients=[[0.0, gradient_permil]], stops_m=[2000.0])
+    motion = train(network, vehicle={"preset": "metro"})
+    while motion.state != "arrived":
+        motion.step()
+        # No more than the brake gives against the slope.
+        assert motion.acceleration_mps2 >= -1.0 - 9.81 * 0.060
+    assert motion.path_m == 2000.0
+
+
+def test_train_that_enters_at_departure_enters_at_speed() -> None:
+    motion = train(depart_s=3.0, speed_kmh=72.0, target_speed_kmh=72.0, enters_at_departure=True)
+    for _ in range(30):
+        motion.step()
+    assert (motion.state, motion.speed_mps, motion.path_m) == ("waiting", 0.0, 0.0)
+    for _ in range(10):
+        motion.step()
+        assert motion.acceleration_mps2 == 0.0
+    assert (motion.speed_mps, motion.path_m) == (20.0, pytest.approx(20.0))
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_train_that_leaves_runs_out_of_the_track(direction: int) -> None:
+    motion = train(
+        line(2000.0),
+        start_m=1000.0,
+        direction=direction,
+        speed_kmh=180.0,
+        target_speed_kmh=180.0,
+        leaves_on_arrival=True,
+    )
+    while motion.state != "arrived":
+        assert abs(motion.speed_mps) == pytest.approx(50.0)
+        motion.step()
+    assert motion.time_s == pytest.approx(20.0, abs=0.11)
+    assert motion.path_m == (2000.0 if direction > 0 else 0.0)
+    assert motion.distance_m == pytest.approx(1000.0)
+    assert (motion.speed_mps, motion.acceleration_mps2) == (0.0, 0.0)
+
+
+def test_train_that_leaves_still_stops_at_its_last_stop() -> None:
+    motion = train(line(2000.0, stops_m=[1500.0]), leaves_on_arrival=True)
+    run_until(motion, "arrived")
+    assert motion.path_m == 1500.0
 
 
 @pytest.mark.parametrize("tick_s", [0.0, -1.0, math.nan, 1e9])

@@ -18,7 +18,12 @@ from math import inf, sqrt
 import numpy as np
 
 from rail_world.profile import StepProfile
-from rail_world.vehicle import Extent
+from rail_world.route import Route
+from rail_world.vehicle import Extent, Vehicle
+
+# The driver plans with this part of full service braking, unless slopes ask for less.
+BRAKE_SHARE = 0.8
+_LEAST_BRAKING_MPS2 = 0.1
 
 
 def limits_for_train(
@@ -127,26 +132,64 @@ class BrakingEnvelope:
         return min(highest, sqrt(under_root) - h)
 
 
-def planned_deceleration_mps2(
-    service_brake_mps2: float, gravity_mps2: float, steepest: float, share: float
-) -> float:
-    """Deceleration that the service brake can always give.
-
-    Parameters
-    ----------
-    service_brake_mps2 : float
-        Full service braking on level track [m/s^2].
-    gravity_mps2 : float
-        Weight over effective mass [m/s^2].
-    steepest : float
-        Steepest slope on the route, as a ratio.
-    share : float
-        Part of the full braking that the driver uses where the slope does not matter.
-    """
-    return min(share * service_brake_mps2, service_brake_mps2 - gravity_mps2 * steepest)
-
-
 def nearest_ahead(points: Sequence[float], s: float, clearance_m: float) -> float:
     """First of increasing points further than the clearance ahead of s, or infinity."""
     index = bisect_right(points, s + clearance_m)
     return points[index] if index < len(points) else inf
+
+
+class Driver:
+    """What the driver of one train on one route keeps to.
+
+    Parameters
+    ----------
+    route : Route
+        The route.
+    vehicle : Vehicle
+        The train set.
+    extent : Extent
+        The train about its reference point.
+    steepest : float
+        Steepest slope on the route, as a ratio.
+    target_speed_mps : float
+        Speed the driver does not exceed in any case [m/s].
+
+    Attributes
+    ----------
+    limits_mps : StepProfile
+        Speed limit for the reference point, with the whole train counted.
+    deceleration_mps2 : float
+        The braking planned with: a share of full service braking, and never more than the service
+        brake gives on the steepest slope down [m/s^2].
+    envelopes : dict of {1, -1} to BrakingEnvelope
+        Permitted speeds for both running directions.
+
+    Raises
+    ------
+    ValueError
+        If the service brake is too weak for the slope.
+    """
+
+    def __init__(
+        self,
+        route: Route,
+        vehicle: Vehicle,
+        extent: Extent,
+        *,
+        steepest: float,
+        target_speed_mps: float = inf,
+    ) -> None:
+        brake = vehicle.service_brake_mps2
+        self.deceleration_mps2 = min(BRAKE_SHARE * brake, brake - vehicle.gravity_mps2 * steepest)
+        if self.deceleration_mps2 < _LEAST_BRAKING_MPS2:
+            raise ValueError(f"is too weak for a slope of {1e3 * steepest:g} per mille")
+        self.limits_mps = limits_for_train(
+            route.limits_mps,
+            extent,
+            length_m=route.length_m,
+            cap_mps=min(vehicle.max_speed_mps, target_speed_mps),
+        )
+        self.envelopes = {
+            direction: BrakingEnvelope(self.limits_mps, direction, self.deceleration_mps2)
+            for direction in (1, -1)
+        }

@@ -7,12 +7,12 @@ run to the last bit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import ceil, inf, isnan
+from math import ceil, inf
 from typing import Literal
 
 from rail_world.description import TrainDescription
-from rail_world.driver import BrakingEnvelope, limits_for_train, planned_deceleration_mps2
+from rail_world.drive_command import DriveCommand
+from rail_world.driver import Driver
 from rail_world.errors import WorldDataError
 from rail_world.itinerary import Itinerary, Target
 from rail_world.network import Network
@@ -20,39 +20,8 @@ from rail_world.vehicle import Extent, LineForces, Vehicle
 
 State = Literal["waiting", "running", "dwelling", "arrived"]
 
-# The driver plans with this part of full service braking, unless slopes ask for less.
-DRIVER_BRAKE_SHARE = 0.8
-_LEAST_BRAKING_MPS2 = 0.1
 _LONGEST_STEP_S = 0.1
 _AT_TARGET_M = 1e-3
-
-
-@dataclass(frozen=True)
-class DriveCommand:
-    """What supervision on board imposes on the driver.
-
-    Parameters
-    ----------
-    max_speed_mps : float
-        Speed not to exceed; above it the full service brake is applied.
-    service_brake, emergency_brake : bool
-        Demands of full braking; the emergency brake goes before.
-
-    Raises
-    ------
-    ValueError
-        If the speed is negative or not a number.
-    """
-
-    max_speed_mps: float = inf
-    service_brake: bool = False
-    emergency_brake: bool = False
-
-    def __post_init__(self) -> None:
-        if isnan(self.max_speed_mps) or self.max_speed_mps < 0.0:
-            raise ValueError(f"max_speed_mps: {self.max_speed_mps} is not a speed")
-
-
 _NO_COMMAND = DriveCommand()
 
 
@@ -98,12 +67,12 @@ class TrainMotion:
         length_m = self.vehicle.length_m
         extent = Extent(length_m, 0.0) if description.direction > 0 else Extent(0.0, length_m)
         self._forces = LineForces(self.route, extent)
-        self._envelopes = self._make_envelopes(extent)
+        self._driver = self._make_driver(extent)
 
         self._ticks = 0
         self._time_s = 0.0
         self._path_m = self._itinerary.start_m
-        self._speed_mps = description.speed_kmh / 3.6  # magnitude
+        self._speed_mps = 0.0  # magnitude
         self._acceleration_mps2 = 0.0
         self._distance_m = 0.0
         self._direction: int = description.direction
@@ -113,42 +82,30 @@ class TrainMotion:
         self._dwell_until_s = 0.0
         self._check_initial_speed()
         if description.depart_s <= 0.0:
-            self._depart()
+            self._start()
 
-    def _make_envelopes(self, extent: Extent) -> dict[int, BrakingEnvelope]:
-        vehicle, description = self.vehicle, self.description
-        braking = planned_deceleration_mps2(
-            vehicle.service_brake_mps2,
-            vehicle.gravity_mps2,
-            self._forces.steepest,
-            DRIVER_BRAKE_SHARE,
-        )
-        if braking < _LEAST_BRAKING_MPS2:
-            raise WorldDataError(
-                f"{self._field}.vehicle.max_service_brake_mps2",
-                vehicle.service_brake_mps2,
-                f"is too weak for a slope of {1e3 * self._forces.steepest:g} per mille",
+    def _make_driver(self, extent: Extent) -> Driver:
+        target_kmh = self.description.target_speed_kmh
+        try:
+            return Driver(
+                self.route,
+                self.vehicle,
+                extent,
+                steepest=self._forces.steepest,
+                target_speed_mps=inf if target_kmh is None else target_kmh / 3.6,
             )
-        self.planned_deceleration_mps2 = braking
-        cap_mps = vehicle.max_speed_mps
-        if description.target_speed_kmh is not None:
-            cap_mps = min(cap_mps, description.target_speed_kmh / 3.6)
-        self._limits = limits_for_train(
-            self.route.limits_mps, extent, length_m=self.route.length_m, cap_mps=cap_mps
-        )
-        return {d: BrakingEnvelope(self._limits, d, braking) for d in (1, -1)}
+        except ValueError as error:
+            field = f"{self._field}.vehicle.max_service_brake_mps2"
+            raise WorldDataError(field, self.vehicle.service_brake_mps2, str(error)) from None
 
     def _check_initial_speed(self) -> None:
-        if self._speed_mps == 0.0:
+        speed_mps = self.description.speed_kmh / 3.6
+        if speed_mps == 0.0:
             return
-        s = self._direction * self._path_m
         target = self._itinerary.next_target(self._at, self._direction)
-        ahead_m = 0.0 if target is None else abs(target.path_m - self._path_m)
-        permitted = min(
-            self._envelopes[self._direction].speed_mps(s),
-            (2.0 * self.planned_deceleration_mps2 * ahead_m) ** 0.5,
-        )
-        if self._speed_mps > permitted * (1.0 + 1e-12):
+        ahead_m = 0.0 if target is None else self._stop_s(target) - self._direction * self._path_m
+        permitted = min(self.permitted_mps, (2.0 * self._driver.deceleration_mps2 * ahead_m) ** 0.5)
+        if speed_mps > permitted * (1.0 + 1e-12):
             raise WorldDataError(
                 f"{self._field}.speed_kmh",
                 self.description.speed_kmh,
@@ -205,12 +162,17 @@ class TrainMotion:
     @property
     def limit_mps(self) -> float:
         """Speed limit for the train as it stands, its whole length counted [m/s]."""
-        return float(self._limits.at(self._path_m))
+        return float(self._driver.limits_mps.at(self._path_m))
 
     @property
     def permitted_mps(self) -> float:
         """Speed the driver keeps here so as to brake in time for the limits ahead [m/s]."""
-        return self._envelopes[self._direction].speed_mps(self._direction * self._path_m)
+        return self._driver.envelopes[self._direction].speed_mps(self._direction * self._path_m)
+
+    @property
+    def planned_deceleration_mps2(self) -> float:
+        """Braking the driver plans with [m/s^2]."""
+        return self._driver.deceleration_mps2
 
     @property
     def next_stop_path_m(self) -> float | None:
@@ -227,6 +189,8 @@ class TrainMotion:
         command : DriveCommand, optional
             What supervision imposes during this tick.
         """
+        if self._state == "waiting" and self._time_s + 1e-9 >= self.description.depart_s:
+            self._start()
         before_mps = self._direction * self._speed_mps
         start_s = self._time_s
         for part in range(self._parts):
@@ -235,12 +199,12 @@ class TrainMotion:
         self._time_s = self._ticks * self._tick_s
         after_mps = self._direction * self._speed_mps
         self._acceleration_mps2 = (after_mps - before_mps) / self._tick_s
+        if self._state == "arrived" and self.description.leaves_on_arrival:
+            self._acceleration_mps2 = 0.0  # gone, not stopped
 
     def _substep(self, now_s: float, command: DriveCommand) -> None:
         now_s += 1e-9  # what is due at this instant is due
-        if self._state == "waiting" and now_s >= self.description.depart_s:
-            self._depart()
-        elif self._state == "dwelling" and now_s >= self._dwell_until_s:
+        if self._state == "dwelling" and now_s >= self._dwell_until_s:
             self._leave()
         if self._state != "running":
             return
@@ -257,17 +221,17 @@ class TrainMotion:
     def _move(self, command: DriveCommand, *, stop_now: bool) -> None:
         vehicle, dt, v = self.vehicle, self._dt_s, self._speed_mps
         s = self._direction * self._path_m
-        stop_s = inf if self._target is None else self._direction * self._target.path_m
+        stop_s = inf if self._target is None else self._stop_s(self._target)
         specific = self._direction * self._forces.slope_sine(self._path_m)
         specific += self._forces.curve_resistance(self._path_m)
         drag = vehicle.running_resistance_mps2(v) + vehicle.gravity_mps2 * specific
 
-        envelope = self._envelopes[self._direction]
+        envelope = self._driver.envelopes[self._direction]
         wanted = envelope.next_speed_mps(s, v, stop_s, dt)
         at_stop = wanted <= 0.0
         wanted = min(wanted, v + (vehicle.traction_mps2(v) - drag) * dt)
         if stop_now:
-            wanted = min(wanted, v - self.planned_deceleration_mps2 * dt)
+            wanted = min(wanted, v - self._driver.deceleration_mps2 * dt)
         full_service = v - (vehicle.service_brake_mps2 + drag) * dt
         if command.emergency_brake:
             wanted = min(wanted, v - (vehicle.emergency_brake_mps2 + drag) * dt)
@@ -285,10 +249,30 @@ class TrainMotion:
             moved_m = 0.5 * v * v * dt / (v - wanted) if wanted < v else 0.0
             if at_stop:
                 moved_m = min(moved_m, stop_s - s) if wanted < 0.0 else stop_s - s
+        if stop_s == inf and self._target is not None:
+            moved_m = self._run_out(self._target, moved_m)
         self._path_m += self._direction * moved_m
         self._distance_m += moved_m
 
+    def _run_out(self, end: Target, moved_m: float) -> float:
+        """Return how far the train moves, which is gone when it reaches the end of the track."""
+        left_m = abs(end.path_m - self._path_m)
+        if moved_m >= left_m:
+            self._speed_mps = 0.0
+            return left_m
+        return moved_m
+
     # --- what comes next --------------------------------------------------------------------
+
+    def _start(self) -> None:
+        self._speed_mps = self.description.speed_kmh / 3.6
+        self._depart()
+
+    def _stop_s(self, target: Target) -> float:
+        """Where to stand for a target, as a position that increases in the running direction."""
+        if target.kind == "end" and self.description.leaves_on_arrival:
+            return inf
+        return self._direction * target.path_m
 
     def _depart(self) -> None:
         self._target = self._itinerary.next_target(self._at, self._direction)

@@ -12,170 +12,30 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Any, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import ValidationError
 
 from rail_world.alignment import Alignment, Element
-from rail_world.description import LONGEST_TRACK_M, TIGHTEST_RADIUS_M, StartPose, check_increasing
+from rail_world.description import StartPose
 from rail_world.errors import WorldDataError
 from rail_world.track import Track, gradients_from_permil, limits_from_kmh
+from rail_world.ttobench_format import (
+    LENGTH_M,
+    SLOPE_PERMIL,
+    SPEED_KMH,
+    Curvatures,
+    TTOBenchFile,
+)
 
 _LARGEST_FILE: Final = 10_000_000
-_LENGTH_M: Final = {"m": 1.0, "km": 1e3}
-_SPEED_KMH: Final = {"km/h": 1.0, "m/s": 3.6}
-_SLOPE_PERMIL: Final = {"permil": 1.0, "\u2030": 1.0, "%": 10.0, "percent": 10.0}
 
 
-def _a_number(value: object) -> object:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError("a number is wanted")
-    return value
-
-
-def _radius(value: object) -> object:
-    if value in ("infinity", "+infinity", "-infinity"):
-        return math.inf
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError('a radius or "infinity" is wanted')
-    if value == 0:
-        raise ValueError("a radius cannot be zero")
-    return value
-
-
-Number = Annotated[float, BeforeValidator(_a_number), Field(allow_inf_nan=False)]
-Radius = Annotated[float, BeforeValidator(_radius)]
-LengthUnit = Literal["m", "km"]
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="ignore", populate_by_name=True)
-
-
-class _Metadata(_Section):
-    id: Annotated[str, Field(max_length=200)] | None = None
-    version: Annotated[str, Field(pattern=r"^TTOBench v1\.\d+$")] | None = Field(
-        default=None, alias="library version"
-    )
-
-
-class _Altitude(_Section):
-    unit: LengthUnit
-    value: Number
-
-    @model_validator(mode="after")
-    def _check(self) -> _Altitude:
-        altitude_m = self.value * _LENGTH_M[self.unit]
-        if not -1000.0 <= altitude_m <= 9000.0:
-            raise ValueError(f"altitude {altitude_m:g} m is not on this Earth's railways")
-        return self
-
-
-class _Stops(_Section):
-    unit: LengthUnit
-    values: tuple[Number, ...] = Field(min_length=2, max_length=10_000)
-
-    @model_validator(mode="after")
-    def _check(self) -> _Stops:
-        if self.values[0] != 0.0:
-            raise ValueError(f"values: the first stop must be at 0, not {self.values[0]:g}")
-        _check_positions(self.values, self.unit)
-        return self
-
-    @property
-    def positions_m(self) -> tuple[float, ...]:
-        return tuple(value * _LENGTH_M[self.unit] for value in self.values)
-
-
-class _SpeedUnits(_Section):
-    position: LengthUnit
-    velocity: Literal["km/h", "m/s"]
-
-
-class _SpeedLimits(_Section):
-    units: _SpeedUnits
-    values: tuple[tuple[Number, Number], ...] = Field(min_length=1, max_length=100_000)
-
-    @model_validator(mode="after")
-    def _check(self) -> _SpeedLimits:
-        _check_positions(tuple(row[0] for row in self.values), self.units.position)
-        if self.values[0][0] != 0.0:
-            raise ValueError(f"values: the first must be at 0, not {self.values[0][0]:g}")
-        for index, (_, limit) in enumerate(self.values):
-            if not 1.0 <= limit * _SPEED_KMH[self.units.velocity] <= 600.0:
-                raise ValueError(
-                    f"values.{index}: a limit of {limit:g} {self.units.velocity} is not within"
-                    " 1 ... 600 km/h"
-                )
-        return self
-
-
-class _SlopeUnits(_Section):
-    position: LengthUnit
-    slope: Literal["permil", "\u2030", "%", "percent"]
-
-
-class _Gradients(_Section):
-    units: _SlopeUnits
-    values: tuple[tuple[Number, Number], ...] = Field(max_length=100_000)
-
-    @model_validator(mode="after")
-    def _check(self) -> _Gradients:
-        _check_positions(tuple(row[0] for row in self.values), self.units.position)
-        for index, (_, slope) in enumerate(self.values):
-            if abs(slope * _SLOPE_PERMIL[self.units.slope]) > 150.0:
-                raise ValueError(
-                    f"values.{index}: a slope of {slope:g} {self.units.slope} is beyond 150 permil"
-                )
-        return self
-
-
-class _CurvatureUnits(_Section):
-    position: LengthUnit
-    start: LengthUnit = Field(alias="radius at start")
-    end: LengthUnit = Field(alias="radius at end")
-
-
-class _Curvatures(_Section):
-    units: _CurvatureUnits
-    values: tuple[tuple[Number, Radius, Radius], ...] = Field(max_length=100_000)
-
-    @model_validator(mode="after")
-    def _check(self) -> _Curvatures:
-        _check_positions(tuple(row[0] for row in self.values), self.units.position)
-        for index, (_, start, end) in enumerate(self.values):
-            for radius, unit in ((start, self.units.start), (end, self.units.end)):
-                if abs(radius * _LENGTH_M[unit]) < TIGHTEST_RADIUS_M:
-                    raise ValueError(
-                        f"values.{index}: a radius of {radius:g} {unit} is below"
-                        f" {TIGHTEST_RADIUS_M:g} m"
-                    )
-        return self
-
-
-class _File(_Section):
-    metadata: _Metadata = _Metadata()
-    altitude: _Altitude = _Altitude(unit="m", value=0.0)
-    stops: _Stops
-    speed_limits: _SpeedLimits = Field(alias="speed limits")
-    gradients: _Gradients | None = None
-    curvatures: _Curvatures | None = None
-
-
-def _check_positions(positions: tuple[float, ...], unit: str) -> None:
-    scaled = tuple(position * _LENGTH_M[unit] for position in positions)
-    check_increasing("values", scaled)
-    if scaled and scaled[0] < 0.0:
-        raise ValueError(f"values: position {scaled[0]:g} m is negative")
-    if scaled and scaled[-1] > LONGEST_TRACK_M:
-        raise ValueError(f"values: position {scaled[-1]:g} m is beyond 1000 km")
-
-
-def _elements(curvatures: _Curvatures | None, length_m: float) -> list[Element]:
+def _elements(curvatures: Curvatures | None, length_m: float) -> list[Element]:
     if curvatures is None or not curvatures.values:
         return [Element(length_m)]
     units = curvatures.units
-    scale = _LENGTH_M[units.position]
+    scale = LENGTH_M[units.position]
     starts_m = [row[0] * scale for row in curvatures.values]
     # The last section reaches to the last stop, or is beyond it.
     ends_m = [*starts_m[1:], max(length_m, starts_m[-1])]
@@ -183,8 +43,8 @@ def _elements(curvatures: _Curvatures | None, length_m: float) -> list[Element]:
     for start_m, end_m, row in zip(starts_m, ends_m, curvatures.values, strict=True):
         if start_m >= length_m:
             break
-        k0 = -1.0 / (row[1] * _LENGTH_M[units.start])
-        k1 = -1.0 / (row[2] * _LENGTH_M[units.end])
+        k0 = -1.0 / (row[1] * LENGTH_M[units.start])
+        k1 = -1.0 / (row[2] * LENGTH_M[units.end])
         if end_m > length_m:
             k1 = k0 + (k1 - k0) * (length_m - start_m) / (end_m - start_m)
             end_m = length_m
@@ -257,7 +117,7 @@ def load_ttobench(path: str | Path, *, name: str = "main", start: StartPose | No
     if not isinstance(data, dict):
         raise WorldDataError("(file)", data, "is not a TTOBench track", file=str(path))
     try:
-        content = _File.model_validate(data)
+        content = TTOBenchFile.model_validate(data)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
         field = ".".join(str(part) for part in first["loc"]) or "(file)"
@@ -280,17 +140,17 @@ def _dig(value: object, place: str) -> object:
     return value
 
 
-def _track(content: _File, name: str, start: StartPose) -> Track:
+def _track(content: TTOBenchFile, name: str, start: StartPose) -> Track:
     stops_m = content.stops.positions_m
     length_m = stops_m[-1]
     limits = content.speed_limits
-    scale = _LENGTH_M[limits.units.position]
-    to_kmh = _SPEED_KMH[limits.units.velocity]
+    scale = LENGTH_M[limits.units.position]
+    to_kmh = SPEED_KMH[limits.units.velocity]
     limit_pairs = tuple((p * scale, v * to_kmh) for p, v in limits.values if p * scale < length_m)
     gradient_pairs: tuple[tuple[float, float], ...] = ()
     if content.gradients is not None and content.gradients.values:
         units = content.gradients.units
-        scale, to_permil = _LENGTH_M[units.position], _SLOPE_PERMIL[units.slope]
+        scale, to_permil = LENGTH_M[units.position], SLOPE_PERMIL[units.slope]
         gradient_pairs = tuple(
             (p * scale, g * to_permil) for p, g in content.gradients.values if p * scale < length_m
         )
@@ -307,5 +167,5 @@ def _track(content: _File, name: str, start: StartPose) -> Track:
         gradients_permil=gradients_from_permil(gradient_pairs),
         limits_mps=limits_from_kmh(limit_pairs),
         stops_m=stops_m,
-        start_altitude_m=content.altitude.value * _LENGTH_M[content.altitude.unit],
+        start_altitude_m=content.altitude.value * LENGTH_M[content.altitude.unit],
     )

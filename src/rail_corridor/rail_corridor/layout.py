@@ -118,21 +118,6 @@ class Layout:
         inside = [zone for zone in zones if zone.start_m <= chainage_m]
         return inside[-1] if inside else zones[0]
 
-    def survey(
-        self, network: Network, zone: Zone, step_m: float = 1.0
-    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Return chainages [n] of a zone and their straight distances from the mast [n], in metres.
-
-        What the paper calls the data base that turns a phase into a place: on a curve the
-        distance from the mast is shorter than the way along the track.
-        """
-        count = max(2, math.ceil(zone.length_m / step_m) + 1)
-        chainage_m = np.linspace(zone.start_m, zone.end_m, count)
-        pose = network.tracks[zone.track].pose(chainage_m)
-        x_m, y_m, z_m = self.station(zone.station).position_m
-        along = np.stack((pose.x_m - x_m, pose.y_m - y_m, pose.z_m - z_m))
-        return chainage_m, np.sqrt(np.einsum("kn,kn->n", along, along))
-
 
 def place_stations(network: Network, plan: StationPlan, channels: ChannelPlan) -> Layout:
     """Place the stations of a network and give every zone its channels.

@@ -124,21 +124,27 @@ def _check_band(scenario: Scenario) -> None:
 
 
 def _check_places_of_trains(trains: Sequence[TrainDescription], fields: Sequence[str]) -> None:
-    """See that no two trains stand in the same place when the later one departs."""
+    """See that no two trains are in one place, before or just after they depart from it."""
     for index, train in enumerate(trains):
         for other in trains[:index]:
             if train.route[0] != other.route[0]:
                 continue
-            if abs(train.depart_s - other.depart_s) >= CLEARING_TIME_S:
-                continue
             (rear, front), (other_rear, other_front) = _extent(train), _extent(other)
-            if (rear < other_front and other_rear < front) or train.start_m == other.start_m:
+            if rear >= other_front or other_rear >= front:
+                continue
+            (since, until), (other_since, other_until) = _presence(train), _presence(other)
+            if since < other_until and other_since < until:
                 raise InputError(
-                    f"{other.name} is in the same place and departs less than"
-                    f" {CLEARING_TIME_S:g} s apart",
+                    f"{other.name} is in the same place within {CLEARING_TIME_S:g} s of departure",
                     field=f"{fields[index]}.start_m",
                     value=train.start_m,
                 )
+
+
+def _presence(train: TrainDescription) -> tuple[float, float]:
+    """Time for which a train takes up the place it starts from [s]."""
+    since_s = train.depart_s if train.enters_at_departure else 0.0
+    return since_s, train.depart_s + CLEARING_TIME_S
 
 
 def _extent(train: TrainDescription) -> tuple[float, float]:

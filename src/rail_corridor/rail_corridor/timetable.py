@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from rail_world.description import Description, Name, Number, TrainDescription
 
@@ -15,10 +15,19 @@ CLEARING_TIME_S: Final = 30.0
 
 
 class TrainTemplate(TrainDescription):
-    """A train of a timetable; its name is continued by a number from 1 on."""
+    """A train of a timetable; its name is continued by a number from 1 on.
+
+    It enters the line when it departs and leaves it when it arrives, unless told otherwise.
+    """
 
     name: Annotated[Name, Field(max_length=36)] = Field(
         default="train", description="first part of the names"
+    )
+    enters_at_departure: bool = Field(
+        default=True, description="whether the train is not on the line before it departs"
+    )
+    leaves_on_arrival: bool = Field(
+        default=True, description="whether the train is gone when its run ends"
     )
 
 
@@ -31,15 +40,9 @@ class Timetable(Description):
     )
     train: TrainTemplate = Field(description="the train; its depart_s is that of the first")
 
-    @model_validator(mode="after")
-    def _from_standstill(self) -> Timetable:
-        if self.train.speed_kmh > 0.0:
-            raise ValueError("train.speed_kmh: trains of a timetable start from standstill")
-        return self
-
     def trains(self) -> tuple[TrainDescription, ...]:
         """Return the trains in order of departure."""
-        common = {name: getattr(self.train, name) for name in self.train.model_fields_set}
+        common = {name: getattr(self.train, name) for name in TrainDescription.model_fields}
         return tuple(
             TrainDescription(
                 **{

@@ -290,6 +290,20 @@ def test_run_onto_a_branch() -> None:
     assert back.distance_m == pytest.approx(1700.0)
 
 
+def test_description_survives_its_own_dump() -> None:
+    description = TrainDescription.model_validate(
+        {
+            "name": "t1",
+            "route": ["main", "branch"],
+            "stop_at_m": [5.0, {"track": "branch", "at_m": 7.0}],
+            "reverse_at": [{"at_m": 50.0}, {"at_s": 100.0}],
+            "vehicle": {"preset": "regional", "mass_kg": 1e5, "davis": {"a_n": 5.0}},
+        }
+    )
+    dumped = description.model_dump_json()
+    assert TrainDescription.model_validate_json(dumped) == description
+
+
 def test_two_runs_are_the_same_to_the_last_bit() -> None:
     network = line(6000.0, gradients=[[0.0, 7.0], [900.0, -13.0]], stops_m=[0.0, 3000.0])
     runs = []

@@ -175,6 +175,18 @@ def test_wrong_junction_fields_are_refused(change: dict[str, Any], field: str) -
         JunctionDescription.model_validate({"track": "main", "at_m": 1.0, "branch": "b", **change})
 
 
+def test_stop_at_the_end_is_on_the_route_whatever_the_rounding() -> None:
+    tenths = TrackDescription.model_validate(
+        {"elements": [{"straight_m": 0.1}] * 1000, "stops_m": [100.0]}
+    )
+    network = build_network({"main": tenths})
+    length_m = network.tracks["main"].length_m
+    assert length_m != 100.0
+    assert network.route(["main"]).stops_m == (min(length_m, 100.0),)
+    ends = build_network({"main": tenths, "spur": BRANCH}, [junction("main", 100.0, "spur")])
+    assert ends.route(["main", "spur"]).length_m == pytest.approx(600.0)
+
+
 def test_network_of_nothing_is_refused() -> None:
     with pytest.raises(WorldDataError, match="at least one track"):
         build_network({})

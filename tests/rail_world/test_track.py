@@ -54,10 +54,12 @@ def test_track_without_limits_has_none() -> None:
     assert track.limit_mps(100.0) == math.inf
 
 
-def test_description_survives_its_own_dump() -> None:
-    description = described()
-    dumped = description.model_dump(mode="json", exclude_unset=True)
-    assert TrackDescription.model_validate(dumped) == description
+@pytest.mark.parametrize("exclude_unset", [True, False])
+@pytest.mark.parametrize("content", [PLAIN, {"ttobench": "line.json"}], ids=["inline", "file"])
+def test_description_survives_its_own_dump(content: dict[str, Any], exclude_unset: bool) -> None:
+    description = TrackDescription.model_validate(content)
+    dumped = description.model_dump_json(exclude_unset=exclude_unset)
+    assert TrackDescription.model_validate_json(dumped) == description
 
 
 @pytest.mark.parametrize(

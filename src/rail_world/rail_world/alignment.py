@@ -96,12 +96,16 @@ def _displacement(k0: FloatArray, c: FloatArray, s: FloatArray) -> npt.NDArray[n
     bent = c != 0.0
     if not bent.any():
         return result
-    k0, c, s = k0[bent], c[bent], s[bent]
+    if not bent.all():
+        k0, c, s = k0[bent], c[bent], s[bent]
     # Rounding of the large phase kappa0^2 / 2c, and cancellation of values near one half.
     with np.errstate(over="ignore"):  # infinite for the smallest rates: not the Fresnel form
         scale = np.sqrt(np.pi / np.abs(c))
         error = np.finfo(np.float64).eps * scale * (1.0 + 0.5 * k0 * k0 / np.abs(c))
     well = error < _FRESNEL_ERROR_M
+    if well.all():
+        result[bent] = _clothoid(k0, c, s)
+        return result
     values = np.empty(s.shape, dtype=np.complex128)
     values[well] = _clothoid(k0[well], c[well], s[well])
     values[~well] = _quadrature(k0[~well], c[~well], s[~well])
@@ -183,12 +187,12 @@ class Alignment:
     def _element_at(self, chainage_m: npt.ArrayLike) -> tuple[npt.NDArray[Any], FloatArray]:
         chainage = np.asarray(chainage_m, dtype=np.float64)
         inside = (chainage >= -_TOLERANCE_M) & (chainage <= self.length_m + _TOLERANCE_M)
-        if not np.all(inside):
+        if not inside.all():
             worst = chainage[~inside].flat[0] if chainage.ndim else chainage
             raise ValueError(f"chainage {worst} m is off the track (0 ... {self.length_m} m)")
-        chainage = np.clip(chainage, 0.0, self.length_m)
-        index = np.searchsorted(self._joints_m, chainage, side="right") - 1
-        index = np.clip(index, 0, len(self.elements) - 1)
+        chainage = np.minimum(np.maximum(chainage, 0.0), self.length_m)
+        # Only inner joints are searched: the end of the track belongs to the last element.
+        index = np.searchsorted(self._joints_m[1:-1], chainage, side="right")
         return index, chainage - self._joints_m[index]
 
     def pose(self, chainage_m: npt.ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:

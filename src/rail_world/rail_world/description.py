@@ -207,9 +207,15 @@ class TrackDescription(Description):
         if (self.elements is None) == (self.ttobench is None):
             raise ValueError("a track has either elements or ttobench")
         if self.ttobench is not None:
-            inline = ("gradients", "speed_limits", "stops_m", "altitude_m")
-            for name in sorted(self.model_fields_set.intersection(inline)):
-                raise ValueError(f"{name}: comes from the TTOBench file, leave it out")
+            inline = (
+                ("gradients", self.gradients),
+                ("speed_limits", self.speed_limits),
+                ("stops_m", self.stops_m),
+                ("altitude_m", self.altitude_m),
+            )
+            for name, value in inline:
+                if value:  # not the default: a dump of this very model stays readable
+                    raise ValueError(f"{name}: comes from the TTOBench file, leave it out")
             return self
         _check_steps("gradients", self.gradients)
         _check_steps("speed_limits", self.speed_limits)

@@ -13,6 +13,7 @@ from rail_world.track import Track, track_from_description
 from rail_world.ttobench import load_ttobench
 
 _CLOSEST_JUNCTIONS_M = 100.0
+_ROUNDING_M = 1e-6
 
 
 class Network:
@@ -96,7 +97,7 @@ class Network:
                         list(tracks),
                         f"no junction on {name} starts {after}, travelling towards {way} chainage",
                     )
-                end_m = junction.at_m
+                end_m = min(junction.at_m, end_m)
             start_m = legs[-1].path_end_m if legs else 0.0
             legs.append(Leg(self.tracks[name], start_m, end_m))
         return Route(legs)
@@ -146,7 +147,7 @@ def _check_names(tracks: Mapping[str, Track], junctions: Sequence[JunctionDescri
             if name not in tracks:
                 raise WorldDataError(f"junctions.{index}.{key}", name, "there is no such track")
         length_m = tracks[junction.track].length_m
-        if junction.at_m > length_m:
+        if junction.at_m > length_m + _ROUNDING_M:
             raise WorldDataError(
                 f"junctions.{index}.at_m",
                 junction.at_m,

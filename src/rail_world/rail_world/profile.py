@@ -45,7 +45,7 @@ class StepProfile:
 
     def _index(self, position_m: FloatArray) -> npt.NDArray[np.intp]:
         index = np.searchsorted(self.starts_m, position_m, side="right") - 1
-        return np.clip(index, 0, None)
+        return np.maximum(index, 0)
 
     def at(self, position_m: npt.ArrayLike) -> FloatArray:
         """Value at positions [...]; at a step the value that begins there."""

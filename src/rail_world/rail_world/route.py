@@ -71,7 +71,12 @@ class Route:
         """Path distances of the stopping points on the route [m], increasing."""
         stops: list[float] = []
         for leg in self.legs:
-            stops += [leg.path_start_m + s for s in leg.track.stops_m if s <= leg.end_m]
+            # A stop at the very end may lie beyond it by the rounding of a sum of elements.
+            stops += [
+                leg.path_start_m + min(s, leg.end_m)
+                for s in leg.track.stops_m
+                if s <= leg.end_m + _TOLERANCE_M
+            ]
         return tuple(sorted(set(stops)))
 
     def path_of(self, track: str, chainage_m: float) -> float:
@@ -99,16 +104,18 @@ class Route:
         """Leg index [...] and chainage [...] [m] of path distances [...] [m]."""
         path = np.asarray(path_m, dtype=np.float64)
         inside = (path >= -_TOLERANCE_M) & (path <= self.length_m + _TOLERANCE_M)
-        if not np.all(inside):
+        if not inside.all():
             raise ValueError(f"a path distance is off the route (0 ... {self.length_m} m)")
-        path = np.clip(path, 0.0, self.length_m)
+        path = np.minimum(np.maximum(path, 0.0), self.length_m)
         # side="left": the points themselves belong to the track they lie on, as in locate().
-        leg = np.clip(np.searchsorted(self._starts_m, path, side="left") - 1, 0, None)
+        leg = np.maximum(np.searchsorted(self._starts_m, path, side="left") - 1, 0)
         return leg, path - self._starts_m[leg]
 
     def pose(self, path_m: npt.ArrayLike) -> Pose:
         """Position and heading at path distances [...]; ValueError off the route."""
         index, chainage = self.locate_all(path_m)
+        if len(self.legs) == 1:
+            return self.legs[0].track.pose(chainage)
         result = np.empty((4, *chainage.shape))
         for number, leg in enumerate(self.legs):
             here = index == number

@@ -1,0 +1,242 @@
+"""The ``rail`` command."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Optional
+
+# One thread for linear algebra: two cores are shared by many nodes, and the bits of a sum must
+# not depend on how many threads computed it. Has to be set before NumPy is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import typer
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="A railway signalling corridor on ROS 2, at waveform level.",
+)
+
+ScenarioArgument = Annotated[
+    str, typer.Argument(help="Name of a built-in scenario, or a YAML file.", metavar="SCENARIO")
+]
+SeedOption = Annotated[
+    Optional[int], typer.Option("--seed", help="Seed of every random draw.", metavar="N")
+]
+DurationOption = Annotated[
+    Optional[float], typer.Option("--duration", help="Simulated time [s].", metavar="S")
+]
+TrackOption = Annotated[
+    Optional[Path],
+    typer.Option("--track", help="TTOBench file that replaces the first track.", metavar="FILE"),
+]
+TrainsOption = Annotated[
+    Optional[int], typer.Option("--trains", help="Number of trains.", metavar="N")
+]
+ZoneOption = Annotated[
+    Optional[float],
+    typer.Option("--zone-length", help="No zone longer than this [m].", metavar="M"),
+]
+
+
+class UsageError(Exception):
+    """Wrong use of a command; one line."""
+
+
+def _load(
+    scenario: str,
+    seed: int | None,
+    duration: float | None,
+    track: Path | None,
+    trains: int | None,
+    zone_length: float | None,
+) -> object:
+    from .scenario import Overrides, load_scenario
+
+    overrides = Overrides(
+        seed=seed, duration_s=duration, track=track, trains=trains, zone_length_m=zone_length
+    )
+    return load_scenario(scenario, overrides=overrides)
+
+
+def _choice(option: str, value: str | None, choices: tuple[str, ...]) -> None:
+    if value is not None and value not in choices:
+        raise UsageError(f"{option}: {value!r}: must be one of {', '.join(choices)}")
+
+
+@app.command()
+def run(
+    scenario: ScenarioArgument,
+    duration: DurationOption = None,
+    rate: Annotated[
+        float,
+        typer.Option(
+            "--rate", help="Simulated seconds per second; 0 = as fast as possible.", metavar="R"
+        ),
+    ] = 0.0,
+    seed: SeedOption = None,
+    processes: Annotated[
+        Optional[str],
+        typer.Option(
+            "--processes",
+            help="one process, one per site and train, or one per node: one, site, node.",
+            metavar="HOW",
+        ),
+    ] = None,
+    track: TrackOption = None,
+    trains: TrainsOption = None,
+    zone_length: ZoneOption = None,
+    report: Annotated[
+        Optional[Path],
+        typer.Option("--report", help="Write the report as JSON.", metavar="FILE.json"),
+    ] = None,
+    only: Annotated[
+        Optional[str],
+        typer.Option(
+            "--only",
+            help="Run one part here, the other on another host: wayside, onboard.",
+            metavar="PART",
+        ),
+    ] = None,
+    timeout: Annotated[
+        float,
+        typer.Option(
+            "--timeout", help="Wall time after which a silent node is given up [s].", metavar="S"
+        ),
+    ] = 5.0,
+) -> None:
+    """Run a corridor, and report."""
+    import math
+
+    _choice("--processes", processes, ("one", "site", "node"))
+    _choice("--only", only, ("wayside", "onboard"))
+    if not (math.isfinite(rate) and 0.0 <= rate <= 1e6):
+        raise UsageError(f"--rate: {rate}: must be from 0 to 1e6")
+    if not (math.isfinite(timeout) and 0.5 <= timeout <= 3600.0):
+        raise UsageError(f"--timeout: {timeout}: must be from 0.5 to 3600 s")
+    if report is not None:
+        _check_writable("--report", report)
+    loaded = _load(scenario, seed, duration, track, trains, zone_length)
+
+    from rich.console import Console
+
+    from .launcher import RunOptions
+    from .launcher import run as run_corridor
+
+    options = RunOptions(rate, processes, only, report, timeout)  # type: ignore[arg-type]
+    raise typer.Exit(run_corridor(loaded, options, Console()))  # type: ignore[arg-type]
+
+
+def _check_writable(option: str, path: Path) -> None:
+    if path.is_dir():
+        raise UsageError(f"{option}: {path}: is a directory")
+    if not path.absolute().parent.is_dir():
+        raise UsageError(f"{option}: {path}: there is no such directory")
+    if not os.access(path.absolute().parent, os.W_OK):
+        raise UsageError(f"{option}: {path}: cannot be written")
+
+
+@app.command()
+def check(
+    scenario: ScenarioArgument,
+    duration: DurationOption = None,
+    seed: SeedOption = None,
+    track: TrackOption = None,
+    trains: TrainsOption = None,
+    zone_length: ZoneOption = None,
+) -> None:
+    """Validate a scenario and show what it would run; starts nothing."""
+    loaded = _load(scenario, seed, duration, track, trains, zone_length)
+
+    from rich.console import Console
+
+    from .summary import print_summary
+
+    print_summary(loaded, Console())  # type: ignore[arg-type]
+
+
+@app.command()
+def scenarios() -> None:
+    """List the built-in scenarios."""
+    from rich.console import Console
+
+    from .summary import print_scenarios
+
+    print_scenarios(Console())
+
+
+@app.command()
+def topics() -> None:
+    """List the topics of the running corridor, and what they carry."""
+    from .live_tools import list_topics
+
+    raise typer.Exit(list_topics())
+
+
+@app.command()
+def echo(
+    topic: Annotated[str, typer.Argument(help="Absolute name of a topic.", metavar="TOPIC")],
+    once: Annotated[bool, typer.Option("--once", help="Stop after one message.")] = False,
+    raw: Annotated[bool, typer.Option("--raw", help="Show the message as it is.")] = False,
+) -> None:
+    """Show the messages of a topic, decoded."""
+    from .live_tools import echo_topic
+
+    raise typer.Exit(echo_topic(topic, once=once, raw=raw))
+
+
+@app.command()
+def hz(
+    topic: Annotated[str, typer.Argument(help="Absolute name of a topic.", metavar="TOPIC")],
+) -> None:
+    """Show how often a topic is published, in wall and in simulated time."""
+    from .live_tools import topic_rate
+
+    raise typer.Exit(topic_rate(topic))
+
+
+@app.command()
+def bench(
+    names: Annotated[
+        Optional[list[str]], typer.Argument(help="Rows to run; all if none.", metavar="NAME...")
+    ] = None,
+    json: Annotated[
+        Optional[Path], typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
+    ] = None,
+) -> None:
+    """Run the benchmarks: every ratio is measured side by side in one run."""
+    if json is not None:
+        _check_writable("--json", json)
+    from .bench import run_benchmarks
+
+    raise typer.Exit(run_benchmarks(tuple(names or ()), json))
+
+
+def main() -> None:
+    """Entry point: every wrong input is one line and exit code 2."""
+    from .errors import InputError
+
+    # Typer brings its own command-line parser, or uses click: its errors are known by name.
+    usage_errors = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
+
+    try:
+        code = app(standalone_mode=False)
+    except (InputError, UsageError) as error:
+        sys.exit(_refuse(str(error)))
+    except usage_errors as error:
+        sys.exit(_refuse(" ".join(error.format_message().split())))
+    except (typer.Abort, KeyboardInterrupt):
+        sys.exit(130)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _refuse(line: str) -> int:
+    print(f"rail: {line}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    main()

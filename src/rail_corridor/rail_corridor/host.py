@@ -1,0 +1,76 @@
+"""One process of a corridor: makes its nodes and spins them until told to stop."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import threading
+from collections.abc import Iterable
+from typing import Any
+
+from .plan import NodeSpec
+
+#: Kind of node -> module and class; the ament packages name the same modules.
+NODE_CLASSES = {
+    "world": ("rail_world.world_node", "WorldNode"),
+    "radio_medium": ("rail_world.radio_medium_node", "RadioMediumNode"),
+    "wrs": ("rail_wayside.wrs_node", "WrsNode"),
+    "zone_controller": ("rail_wayside.zone_controller_node", "ZoneControllerNode"),
+    "vrs": ("rail_onboard.vrs_node", "VrsNode"),
+}
+#: Kinds whose name is a parameter of the scenario rather than of the class.
+_NAMED = {"wrs", "vrs"}
+#: With more nodes than this in a process the parameter services are left out.
+MOST_NODES_WITH_SERVICES = 12
+
+
+def node_class(kind: str) -> Any:
+    """Class of a kind of node."""
+    module, name = NODE_CLASSES[kind]
+    return getattr(importlib.import_module(module), name)
+
+
+def make_node(spec: NodeSpec, context: Any, services: bool) -> Any:
+    """Create a node; equipment is switched on."""
+    namespace, _, name = spec.name.rpartition("/")
+    arguments: dict[str, Any] = {
+        "namespace": namespace,
+        "context": context,
+        "parameters": spec.parameters,
+        "services": services,
+    }
+    kind = node_class(spec.kind)
+    node = kind(name, **arguments) if spec.kind in _NAMED else kind(**arguments)
+    if hasattr(node, "switch_on"):
+        node.switch_on()
+    return node
+
+
+def run_nodes(specs: Iterable[NodeSpec]) -> None:
+    """Make nodes in this process and spin them until SIGTERM."""
+    import rclpy
+    from rail_msgs_py.standalone import spin
+    from rclpy.signals import SignalHandlerOptions
+
+    specs = list(specs)
+    context = rclpy.Context()
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    services = len(specs) <= MOST_NODES_WITH_SERVICES
+    nodes = [make_node(spec, context, services) for spec in specs]
+    try:
+        spin(context, nodes)
+    finally:
+        for node in nodes:
+            node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def die_with(lifeline: int) -> None:
+    """End this process when the other end of a pipe closes, however the launcher ended."""
+
+    def watch() -> None:
+        os.read(lifeline, 1)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=watch, daemon=True).start()

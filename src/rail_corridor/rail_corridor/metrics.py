@@ -1,0 +1,221 @@
+"""From a recording to figures: ranging against truth and bound, handovers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rail_msgs_py.topics import LINK_COLUMNS, STATE_COLUMNS
+from rail_signals.bounds import two_way_range_variance_bound
+
+from .layout import Layout, Zone
+from .recording import FloatArray, Recording
+from .scenario import Scenario
+
+#: A handover must be done when the train is this far past the station, plus one tick of travel.
+HANDOVER_DEPTH_M = 20.0
+_MIN_SLOPE = 0.05
+
+_STATE = {name: index for index, name in enumerate(STATE_COLUMNS)}
+_LINK = {name: index for index, name in enumerate(LINK_COLUMNS)}
+
+
+@dataclass(frozen=True)
+class _Run:
+    """The columns of one train, arrays over the ticks."""
+
+    path_m: FloatArray
+    track: FloatArray
+    chainage_m: FloatArray
+    speed_mps: FloatArray
+    on_line: NDArray[np.bool_]
+
+
+def train_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
+    """Report section of one train."""
+    state = recording.state.upto(recording.ticks)[:, index]
+    run = _Run(
+        state[:, _STATE["path_m"]],
+        state[:, _STATE["track_index"]],
+        state[:, _STATE["chainage_m"]],
+        state[:, _STATE["speed_mps"]],
+        state[:, _STATE["on_line"]] > 0.0,
+    )
+    zones = _zones_of(scenario.layout, recording.tracks, run)
+    channel = recording.channel.upto(recording.ticks)[:, index, 0]
+    travelled_m = float(np.nansum(np.abs(np.diff(run.path_m)))) if run.path_m.size else 0.0
+    return {
+        "distance_m": travelled_m,
+        "handovers": handovers(scenario, run.chainage_m, run.speed_mps, zones, channel),
+        "phase_ranging": _ranging(scenario, recording, index, run, zones, channel),
+    }
+
+
+def _zones_of(
+    layout: Layout, tracks: tuple[str, ...], run: _Run
+) -> list[Zone | None]:
+    """Zone that the train is in at each tick, None while it is not on the line."""
+    zones: list[Zone | None] = []
+    last: Zone | None = None
+    for on_line, track, chainage_m in zip(run.on_line, run.track, run.chainage_m, strict=True):
+        if not on_line:
+            zones.append(None)
+            continue
+        name = tracks[int(track)]
+        if last is None or last.track != name or not last.start_m <= chainage_m < last.end_m:
+            last = layout.zone_at(name, float(chainage_m))
+        zones.append(last)
+    return zones
+
+
+def handovers(
+    scenario: Scenario,
+    chainage_m: FloatArray,
+    speed_mps: FloatArray,
+    zones: list[Zone | None],
+    channel: FloatArray,
+) -> dict[str, int]:
+    """Count handovers of one train.
+
+    One is *expected* when the train has left a zone for another for good: when it is
+    `HANDOVER_DEPTH_M` and one tick of travel inside. It is *made* if the transponder is on the
+    channel of that zone by then, else *missed*. A change to a channel that belongs to no zone
+    this close is *wrong*.
+    """
+    expected = made = wrong = 0
+    confirmed: Zone | None = None
+    before = 0.0
+    for tick, zone in enumerate(zones):
+        if zone is None:
+            continue
+        depth_m = HANDOVER_DEPTH_M + abs(speed_mps[tick]) * scenario.tick_s
+        here = chainage_m[tick]
+        in_force = channel[tick]
+        if confirmed is None:
+            confirmed = zone
+        elif zone is not confirmed and zone.downlink_channel != confirmed.downlink_channel:
+            inside_m = min(here - zone.start_m, zone.end_m - here) if (
+                zone.track == confirmed.track
+            ) else here - zone.start_m
+            if inside_m >= depth_m:
+                expected += 1
+                made += int(in_force == zone.downlink_channel)
+                confirmed = zone
+        elif zone is not confirmed:
+            confirmed = zone
+        if in_force > 0.0 and before > 0.0 and in_force != before:
+            near = _zones_near(scenario.layout, zone, here, depth_m)
+            wrong += int(in_force not in {z.downlink_channel for z in near})
+        if in_force > 0.0:
+            before = in_force
+    return {"expected": expected, "made": made, "missed": expected - made, "wrong": wrong}
+
+
+def _zones_near(layout: Layout, zone: Zone, chainage_m: float, depth_m: float) -> list[Zone]:
+    near = [zone]
+    if chainage_m - zone.start_m < depth_m and zone.previous is not None:
+        near.append(layout.zone(zone.previous))
+    if zone.end_m - chainage_m < depth_m:
+        near.extend(layout.zone(name) for name in zone.next)
+    return near
+
+
+def _ranging(
+    scenario: Scenario,
+    recording: Recording,
+    index: int,
+    run: _Run,
+    zones: list[Zone | None],
+    channel: FloatArray,
+) -> dict[str, Any]:
+    """Position by phase ranging against the truth and against what the links allow."""
+    position = recording.position.upto(recording.ticks)[:, index]
+    links = recording.links.upto(recording.ticks)[:, index]
+    known = run.on_line & np.isfinite(position[:, 2])
+    route = scenario.network.route(
+        list(scenario.trains[index].route), scenario.trains[index].direction
+    )
+    offsets = np.full(len(recording.tracks), np.nan)
+    for leg in route.legs:
+        offsets[recording.tracks.index(leg.track.name)] = leg.path_start_m
+    track = np.where(known, position[:, 0], 0.0).astype(int)
+    error_m = offsets[track] + position[:, 1] - run.path_m
+    wrong_track = known & np.isnan(offsets[track])
+    usable = known & ~wrong_track
+    bound_m2 = _bound_m2(scenario, recording, index, run, zones, channel, links)
+    with np.errstate(invalid="ignore"):
+        bounded = usable & np.isfinite(bound_m2)
+        normalised = error_m[usable] ** 2 / position[usable, 2]
+    on_line = int(np.count_nonzero(run.on_line))
+    return {
+        "availability": _ratio(np.count_nonzero(known), on_line),
+        "rmse_m": _rms(error_m[usable]),
+        "bound_m": _root_mean(bound_m2[bounded]),
+        "p95_m": _figure(np.quantile(np.abs(error_m[usable]), 0.95)) if usable.any() else None,
+        "max_m": _figure(np.max(np.abs(error_m[usable]))) if usable.any() else None,
+        "normalised_error": _root_mean(normalised),
+        "wrong_track_ticks": int(np.count_nonzero(wrong_track)),
+    }
+
+
+def _bound_m2(
+    scenario: Scenario,
+    recording: Recording,
+    index: int,
+    run: _Run,
+    zones: list[Zone | None],
+    channel: FloatArray,
+    links: FloatArray,
+) -> FloatArray:
+    """Cramér-Rao bound of the chainage at each tick: that of the range over its slope."""
+    signal = scenario.ranging.signal
+    down, up = links[:, _LINK["snr_down"]], links[:, _LINK["snr_up"]]
+    heard = (down > 0.0) & (up > 0.0)
+    bound = np.full(len(down), np.inf)
+    bound[heard] = two_way_range_variance_bound(
+        down[heard], up[heard], signal.samples, signal.indices[0], signal.tones_hz[0]
+    )
+    slope = np.full(len(down), np.nan)
+    state = recording.state.upto(recording.ticks)[:, index]
+    columns = [_STATE[name] for name in ("x_m", "y_m", "z_m", "heading_rad")]
+    where = state[:, columns]
+    ranged = [_ranging_zone(scenario.layout, zone, c) for zone, c in zip(zones, channel)]
+    for zone in {z.name: z for z in ranged if z is not None}.values():
+        ticks = np.array([tick for tick, z in enumerate(ranged) if z is not None and z is zone])
+        line = where[ticks, :3] - np.array(scenario.layout.station(zone.station).position_m)
+        ahead = line[:, 0] * np.cos(where[ticks, 3]) + line[:, 1] * np.sin(where[ticks, 3])
+        slope[ticks] = ahead / np.sqrt(np.einsum("nk,nk->n", line, line))
+    with np.errstate(invalid="ignore"):
+        bound = np.asarray(bound / np.maximum(np.abs(slope), _MIN_SLOPE) ** 2)
+    bound[np.isnan(slope)] = np.inf
+    return bound
+
+
+def _ranging_zone(layout: Layout, zone: Zone | None, channel: float) -> Zone | None:
+    """The zone whose station ranges the train: its own, or a neighbour it is still tuned to."""
+    if zone is None:
+        return None
+    around = [zone]
+    if zone.previous is not None:
+        around.append(layout.zone(zone.previous))
+    around.extend(layout.zone(name) for name in zone.next)
+    return next((z for z in around if z.downlink_channel == channel), None)
+
+
+def _rms(values: FloatArray) -> float | None:
+    return _figure(math.sqrt(float(np.mean(values**2)))) if values.size else None
+
+
+def _root_mean(values: FloatArray) -> float | None:
+    return _figure(math.sqrt(float(np.mean(values)))) if values.size else None
+
+
+def _ratio(part: int, whole: int) -> float | None:
+    return part / whole if whole else None
+
+
+def _figure(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

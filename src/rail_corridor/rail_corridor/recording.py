@@ -1,0 +1,71 @@
+"""What a run said and what was true, tick by tick, as arrays."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+POSITION_COLUMNS = ("track_index", "chainage_m", "variance_m2", "speed_mps")
+_FIRST_TICKS = 1024
+
+
+class Record:
+    """One table per tick, [tick, train, column]; NaN where nothing was received."""
+
+    def __init__(self, trains: int, columns: int) -> None:
+        self._values = np.full((_FIRST_TICKS, trains, columns), np.nan)
+        self.ticks = 0
+
+    def put(self, tick: int, train: int | slice, values: FloatArray) -> None:
+        """Store the row of one train, or the table of all of them."""
+        while tick >= len(self._values):
+            more = np.full_like(self._values, np.nan)
+            self._values = np.concatenate((self._values, more))
+        self._values[tick, train] = values
+        self.ticks = max(self.ticks, tick + 1)
+
+    def upto(self, ticks: int) -> FloatArray:
+        """The first ticks, [tick, train, column]."""
+        while ticks > len(self._values):
+            self._values = np.concatenate((self._values, np.full_like(self._values, np.nan)))
+        return self._values[:ticks]
+
+
+class Recording:
+    """Truth, links, channels and positions of all trains.
+
+    Parameters
+    ----------
+    trains, tracks : tuple of str
+        Names, in the order of the scenario.
+    channels : int
+        Number of downlink channels.
+    """
+
+    def __init__(self, trains: tuple[str, ...], tracks: tuple[str, ...], channels: int) -> None:
+        from rail_msgs_py.topics import LINK_COLUMNS, STATE_COLUMNS
+
+        self.trains = trains
+        self.tracks = tracks
+        self.state = Record(len(trains), len(STATE_COLUMNS))
+        self.links = Record(len(trains), len(LINK_COLUMNS))
+        self.channel = Record(len(trains), 2 + channels)
+        self.position = Record(len(trains), len(POSITION_COLUMNS))
+
+    @property
+    def ticks(self) -> int:
+        """Ticks whose truth has been received."""
+        return self.state.ticks
+
+    def digest(self) -> str:
+        """SHA-256 of everything the equipment estimated, to the last bit."""
+        total = hashlib.sha256()
+        for record in (self.position, self.channel):
+            values = np.ascontiguousarray(record.upto(self.ticks), dtype="<f8")
+            # One bit pattern for every NaN.
+            total.update(np.where(np.isnan(values), np.nan, values).tobytes())
+        return total.hexdigest()

@@ -1,0 +1,123 @@
+"""The report of a run: one JSON object, and a table of the same on the screen."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from .metrics import train_metrics
+from .observer import Observer
+from .plan import Plan
+from .scenario import Scenario
+
+_MOST_EVENTS_SHOWN = 8
+
+
+def make_report(
+    scenario: Scenario,
+    plan: Plan,
+    observer: Observer,
+    *,
+    nodes: int,
+    processes: int,
+    interrupted: bool,
+) -> dict[str, Any]:
+    """Report of what an observer has recorded."""
+    recording = observer.recording
+    ticks = recording.ticks
+    wall_s = max(observer.last_tick_s - observer.first_tick_s, 0.0) if ticks else 0.0
+    sim_s = ticks * plan.tick_s
+    trains = {}
+    for index, name in enumerate(recording.trains):
+        section = train_metrics(scenario, recording, index)
+        unit = plan.transponders[name]
+        section["phase_ranging"]["calibration_residual_m"] = unit.residual_m
+        trains[name] = section
+    return {
+        "scenario": plan.scenario,
+        "seed": plan.seed,
+        "ticks": ticks,
+        "sim_time_s": round(sim_s, 9),
+        "wall_time_s": wall_s,
+        "real_time_factor": sim_s / wall_s if wall_s > 0.0 else None,
+        "nodes": nodes,
+        "processes": processes,
+        "complete": not interrupted,
+        "digest": recording.digest(),
+        "failures": observer.failures,
+        "events": [event for event in observer.events if event["level"] != "ok"],
+        "trains": trains,
+    }
+
+
+def write_report(report: dict[str, Any], path: Path) -> None:
+    """Write the report so that a reader finds the old one or the new one, never half of one."""
+    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    draft.write_text(json.dumps(report, indent=2, allow_nan=False) + "\n")
+    draft.replace(path)
+
+
+def print_report(report: dict[str, Any], console: Console) -> None:
+    """Show the report as a table."""
+    table = Table(title=_title(report), title_justify="left", title_style="bold")
+    for heading in ("train", "travelled", "handovers", "position\nknown"):
+        table.add_column(heading, justify="left" if heading == "train" else "right")
+    for heading in ("RMSE", "bound", "95 %", "max"):
+        table.add_column(heading, justify="right")
+    for name, train in report["trains"].items():
+        ranging, changes = train["phase_ranging"], train["handovers"]
+        problems = [f"{changes[key]} {key}" for key in ("missed", "wrong") if changes[key]]
+        table.add_row(
+            name,
+            f"{train['distance_m'] / 1000.0:.2f} km",
+            f"{changes['made']} of {changes['expected']}" + "".join(f", {p}" for p in problems),
+            _percent(ranging["availability"]),
+            *(_metres(ranging[key]) for key in ("rmse_m", "bound_m", "p95_m", "max_m")),
+        )
+    console.print(table)
+    factor = report["real_time_factor"]
+    speed = f"{factor:.1f} times real time, " if factor else ""
+    console.print(
+        f"{report['ticks']} ticks, {report['sim_time_s']:.1f} s simulated in "
+        f"{report['wall_time_s']:.1f} s: {speed}{report['nodes']} nodes in "
+        f"{report['processes']} processes"
+    )
+    console.print(f"digest {report['digest'][:16]} (the same for every placement and rate)")
+    for failed in report["failures"]:
+        console.print(
+            f"[red]failed[/red] {failed['node']} at {failed['time_s']:.1f} s: {failed['reason']}"
+            f" (noticed by {failed['detected_by']})",
+            soft_wrap=True,
+        )
+    _print_events(report["events"], console)
+
+
+def _print_events(events: list[dict[str, Any]], console: Console) -> None:
+    for event in events[:_MOST_EVENTS_SHOWN]:
+        console.print(
+            f"[yellow]{event['level']}[/yellow] {event['time_s']:8.1f} s  "
+            f"{event['name']}: {event['message']}",
+            soft_wrap=True,
+            highlight=False,
+        )
+    if len(events) > _MOST_EVENTS_SHOWN:
+        rest = len(events) - _MOST_EVENTS_SHOWN
+        console.print(f"... and {rest} more events in the JSON report (--report FILE.json)")
+
+
+def _title(report: dict[str, Any]) -> str:
+    state = "" if report["complete"] else " (stopped early)"
+    return f"{report['scenario']}, seed {report['seed']}{state}: position by phase ranging"
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100.0 * share:.1f} %"
+
+
+def _metres(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f} m"

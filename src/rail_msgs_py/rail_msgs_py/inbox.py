@@ -1,0 +1,84 @@
+"""What a node still waits for in the tick at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+
+class TickInbox(Generic[Item]):
+    """Collects exactly one item per port and tick, whatever the order of arrival.
+
+    A port whose node failed is not waited for; it is again as soon as it is heard.
+
+    >>> inbox = TickInbox(["a", "b"])
+    >>> inbox.put(0, "b", 2.0)
+    >>> inbox.put(0, "a", 1.0)
+    >>> inbox.complete, inbox.take()
+    (True, (0, {'a': 1.0, 'b': 2.0}))
+    """
+
+    def __init__(self, ports: Iterable[str]) -> None:
+        self.ports: tuple[str, ...] = tuple(sorted(ports))
+        self._awaited = set(self.ports)
+        self._ticks: dict[int, dict[str, Item]] = {}
+        self._taken_ns = -1
+
+    def put(self, stamp_ns: int, port: str, item: Item) -> None:
+        """Add an item; one of a tick already taken only shows that its port is alive again."""
+        self._awaited.add(port)
+        if stamp_ns > self._taken_ns:
+            self._ticks.setdefault(stamp_ns, {})[port] = item
+
+    @property
+    def stamp_ns(self) -> int | None:
+        """Earliest tick of which anything has arrived, None if nothing is here."""
+        return min(self._ticks) if self._ticks else None
+
+    @property
+    def complete(self) -> bool:
+        """Whether every awaited port of the earliest tick has been heard."""
+        if not self._ticks:
+            return False
+        items = self._ticks[min(self._ticks)]
+        return len(items) >= len(self._awaited) and self._awaited <= items.keys()
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Awaited ports not heard yet in the earliest tick, sorted."""
+        items = self._ticks[min(self._ticks)] if self._ticks else {}
+        return tuple(sorted(self._awaited - items.keys()))
+
+    @property
+    def awaits_anything(self) -> bool:
+        """Whether any port is still waited for."""
+        return bool(self._awaited)
+
+    def drop(self, ports: Iterable[str]) -> None:
+        """Wait no longer for these ports."""
+        self._awaited.difference_update(ports)
+
+    def take(self) -> tuple[int, dict[str, Item]]:
+        """Stamp and items of the earliest tick, complete or not.
+
+        The items come in the order of the port names, so that sums over them are repeatable.
+
+        Raises
+        ------
+        LookupError
+            If nothing has arrived.
+        """
+        if not self._ticks:
+            raise LookupError("nothing has arrived")
+        stamp_ns = min(self._ticks)
+        items = self._ticks.pop(stamp_ns)
+        self._taken_ns = stamp_ns
+        return stamp_ns, {port: items[port] for port in self.ports if port in items}
+
+    def reset(self) -> None:
+        """Forget everything, as when simulated time jumps back."""
+        self._ticks.clear()
+        self._taken_ns = -1
+        self._awaited = set(self.ports)

@@ -1,0 +1,214 @@
+"""What every node of the corridor shares: streams, readiness, failures, health."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.lifecycle import LifecycleNode
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import String
+
+from rail_msgs_py import topics
+from rail_msgs_py.parameters import overrides
+from rail_msgs_py.stamps import to_time
+
+READY_POLL_S = 0.05
+
+
+def node_arguments(
+    context: Any, parameters: Mapping[str, Any] | None, services: bool
+) -> dict[str, Any]:
+    """Constructor arguments common to all nodes.
+
+    Parameters
+    ----------
+    context : rclpy Context, or None for the default one
+    parameters : mapping, or None
+        Values that override the defaults, as from a parameter file.
+    services : bool
+        Whether to offer the parameter services; they quadruple the time to create a node.
+    """
+    return {
+        "context": context,
+        "parameter_overrides": overrides(dict(parameters or {})),
+        "start_parameter_services": services,
+        "enable_rosout": services,
+    }
+
+
+class CorridorMixin:
+    """Streams, readiness, failures and health on top of an rclpy node."""
+
+    def init_corridor(self: Any) -> None:
+        """Create what every node has; call once after the node's own constructor."""
+        self._connections: list[Callable[[], bool]] = []
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._diagnostics = self.publisher(topics.DIAGNOSTICS)
+        self._health: dict[str, tuple[int, str]] = {}
+        self._ready_publisher: Any = None
+        self._ready_timer: Any = None
+
+    def publisher(self: Any, topic: topics.Topic, **parts: object) -> Any:
+        """Publisher of a topic of the table."""
+        return self.create_publisher(topic.type, topic.name(**parts), topic.qos)
+
+    def stream_out(self: Any, topic: topics.Topic, **parts: object) -> Callable[[bytes], None]:
+        """Function that publishes serialised messages to a reader that the tick waits for."""
+        publisher = self.publisher(topic, **parts)
+        self._connections.append(lambda: publisher.get_subscription_count() > 0)
+        publish: Callable[[bytes], None] = publisher.publish
+        return publish
+
+    def stream_in(
+        self: Any, topic: topics.Topic, callback: Callable[[bytes], None], **parts: object
+    ) -> None:
+        """Subscribe to serialised messages of a topic of the table."""
+        name = topic.name(**parts)
+        self._subscribe(topic.type, name, callback, topic.qos, raw=True)
+        self._connections.append(lambda: self.count_publishers(name) > 0)
+
+    def listen(
+        self: Any, topic: topics.Topic, callback: Callable[[Any], None], **parts: object
+    ) -> None:
+        """Subscribe to messages of a topic that nothing waits for."""
+        self._subscribe(topic.type, topic.name(**parts), callback, topic.qos, raw=False)
+
+    def _subscribe(
+        self: Any,
+        kind: Any,
+        name: str,
+        callback: Callable[[Any], None],
+        qos: QoSProfile,
+        *,
+        raw: bool,
+    ) -> None:
+        self.create_subscription(kind, name, self.guarded(callback), qos, raw=raw)
+
+    def guarded(self: Any, callback: Callable[..., None]) -> Callable[..., None]:
+        """Callback whose exceptions are told on ``/diagnostics`` instead of stopping the process.
+
+        The tick's timeout then treats the node as silent, as it would a broken device.
+        """
+
+        def run(*arguments: Any) -> None:
+            try:
+                callback(*arguments)
+            except Exception as error:
+                self.get_logger().error(traceback.format_exc())
+                self.report(DiagnosticStatus.ERROR, "software", f"{type(error).__name__}: {error}")
+
+        return run
+
+    def every(self: Any, period_s: float, callback: Callable[[], None]) -> Any:
+        """Timer on the steady wall clock."""
+        return self.create_timer(period_s, self.guarded(callback), clock=self._steady)
+
+    def steady_s(self: Any) -> float:
+        """Steady wall-clock time."""
+        return float(self._steady.now().nanoseconds) * 1e-9
+
+    def announce_when_connected(self: Any, condition: Callable[[], bool] | None = None) -> None:
+        """Publish the node's name on ``/ready`` once all its streams have a counterpart."""
+        if condition is not None:
+            self._connections.append(condition)
+        self._ready_publisher = self.publisher(topics.READY)
+
+        def poll() -> None:
+            while self._connections and self._connections[-1]():
+                self._connections.pop()
+            if not self._connections:
+                self._ready_publisher.publish(String(data=self.get_fully_qualified_name()))
+                self._ready_timer.cancel()
+
+        self._ready_timer = self.every(READY_POLL_S, poll)
+
+    def report(
+        self: Any,
+        level: bytes,
+        what: str,
+        message: str,
+        values: Iterable[tuple[str, str]] = (),
+        stamp_ns: int = 0,
+    ) -> None:
+        """Publish the health of one aspect of the node, if it changed."""
+        if self._health.get(what) == (level, message):
+            return
+        self._health[what] = (level, message)
+        status = DiagnosticStatus(
+            level=level,
+            name=f"{self.get_fully_qualified_name()}: {what}",
+            message=message,
+            hardware_id=self.get_fully_qualified_name(),
+            values=[KeyValue(key=key, value=value) for key, value in values],
+        )
+        array = DiagnosticArray(status=[status])
+        for key, part in to_time(stamp_ns).items():
+            setattr(array.header.stamp, key, part)
+        self._diagnostics.publish(array)
+
+
+class CorridorNode(CorridorMixin, Node):  # type: ignore[misc]
+    """Node of the corridor."""
+
+    def __init__(
+        self,
+        name: str,
+        namespace: str,
+        *,
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(
+            name, namespace=namespace, **node_arguments(context, parameters, services)
+        )
+        self.init_corridor()
+
+
+class Equipment(CorridorMixin, LifecycleNode):  # type: ignore[misc]
+    """Managed node: deactivating it by the standard service switches the equipment off.
+
+    It starts active, as equipment does that is plugged in. Switched off it still answers
+    every tick, with silence, so that the corridor need not find out by a timeout.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        namespace: str,
+        *,
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(
+            name,
+            namespace=namespace,
+            enable_communication_interface=services,
+            **node_arguments(context, parameters, services),
+        )
+        self.switched_on = False
+        self.init_corridor()
+
+    def switch_on(self) -> None:
+        """Configure and activate."""
+        self.trigger_configure()
+        self.trigger_activate()
+
+    def on_activate(self, state: Any) -> Any:
+        """Lifecycle transition."""
+        self.switched_on = True
+        self.report(DiagnosticStatus.OK, "equipment", "switched on")
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: Any) -> Any:
+        """Lifecycle transition."""
+        self.switched_on = False
+        self.report(DiagnosticStatus.WARN, "equipment", "switched off")
+        return super().on_deactivate(state)

@@ -1,0 +1,110 @@
+"""Node parameters as frozen dataclasses: described, bounded, declared once.
+
+A node's parameters are the fields of one dataclass, made with :func:`parameter`. The same
+fields declare the ROS parameters, validate their values and fill ``docs/topics.md``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any, TypeVar, get_type_hints
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterException
+from rclpy.parameter import Parameter
+
+Parameters = TypeVar("Parameters")
+
+_ARRAYS = {
+    tuple[float, ...]: Parameter.Type.DOUBLE_ARRAY,
+    tuple[int, ...]: Parameter.Type.INTEGER_ARRAY,
+    tuple[str, ...]: Parameter.Type.STRING_ARRAY,
+}
+
+
+class ParameterError(ValueError):
+    """A parameter has a value that the node cannot work with; one line says which."""
+
+
+def parameter(
+    default: Any, text: str, *, unit: str = "", low: float = -math.inf, high: float = math.inf
+) -> Any:
+    """Field of a parameter dataclass.
+
+    Parameters
+    ----------
+    default : bool, int, float, str or tuple
+        Default value.
+    text, unit : str
+        What it is, and in what unit.
+    low, high : float
+        Inclusive bounds of a number, and of each number of an array.
+    """
+    return dataclasses.field(
+        default=default, metadata={"text": text, "unit": unit, "low": low, "high": high}
+    )
+
+
+def declare(node: Any, kind: type[Parameters]) -> Parameters:
+    """Declare every field of ``kind`` on ``node`` and return the values in force.
+
+    Raises
+    ------
+    ParameterError
+        If a value has the wrong type or is out of bounds.
+    """
+    hints = get_type_hints(kind)
+    values = {}
+    for field in dataclasses.fields(kind):  # type: ignore[arg-type]
+        hint = hints[field.name]
+        try:
+            values[field.name] = _declare_field(node, field, hint)
+        except (ParameterException, ValueError, TypeError) as error:
+            reason = str(error).splitlines()[0]
+            raise ParameterError(f"{node.get_name()}: {field.name}: {reason}") from None
+    return kind(**values)
+
+
+def _declare_field(node: Any, field: dataclasses.Field[Any], hint: Any) -> Any:
+    described = descriptor(field, hint)
+    if hint in _ARRAYS:
+        value = node.declare_parameter(field.name, _ARRAYS[hint], described).value
+        # An array parameter that nobody sets has no value: there is no typed empty default.
+        value = field.default if value is None else tuple(value)
+        numbers = value
+    else:
+        value = node.declare_parameter(field.name, hint(field.default), described).value
+        numbers = (value,)
+    for number in numbers:
+        if isinstance(number, bool) or not isinstance(number, (int, float)):
+            continue
+        low, high = field.metadata["low"], field.metadata["high"]
+        if math.isnan(number) or not low <= number <= high:
+            raise ValueError(f"{number} is not within [{low}, {high}] {field.metadata['unit']}")
+    return value
+
+
+def descriptor(field: dataclasses.Field[Any], hint: Any) -> ParameterDescriptor:
+    """ROS descriptor of a field: text with unit, bounds, read-only once the node is up."""
+    unit = field.metadata["unit"]
+    described = ParameterDescriptor(
+        description=field.metadata["text"] + (f" [{unit}]" if unit else ""), read_only=True
+    )
+    low, high = field.metadata["low"], field.metadata["high"]
+    if hint is float and math.isfinite(low) and math.isfinite(high):
+        described.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
+    elif hint is int and math.isfinite(low) and math.isfinite(high):
+        described.integer_range = [IntegerRange(from_value=int(low), to_value=int(high), step=1)]
+    return described
+
+
+def overrides(values: dict[str, Any]) -> list[Parameter]:
+    """Parameter overrides for a node made in this process."""
+    made = []
+    for name, value in values.items():
+        if isinstance(value, tuple):
+            value = list(value)
+        if value != []:
+            made.append(Parameter(name, value=value))
+    return made

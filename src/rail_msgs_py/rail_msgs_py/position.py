@@ -1,0 +1,122 @@
+"""Train positions as ``nav_msgs/Odometry`` in a track-aligned frame.
+
+``header.frame_id`` is the track, ``child_frame_id`` the train, ``pose.position.x`` the
+chainage [m], ``twist.linear.x`` the speed along the track [m/s]. An infinite variance says
+that the position is *not known*: the chainage is then only the last one that was.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from typing import Any, Final
+
+from nav_msgs.msg import Odometry
+from rclpy.serialization import serialize_message
+
+from rail_msgs_py.stamps import NANOSECONDS, to_ns
+
+_STAMP = struct.Struct("<iI")
+# Tail of the serialised message: pose 7 + covariance 36, twist 6 + covariance 36.
+_TAIL_VALUES: Final = 85
+_TWIST_AT: Final = 43
+_PACK = struct.Struct("<d")
+_HEAD = struct.Struct("<4siII")
+# Of chainage, its variance, speed, its variance in the tail [bytes].
+_PLACES: Final = (0, 8 * 7, 8 * _TWIST_AT, 8 * (_TWIST_AT + 6))
+
+
+@dataclass(frozen=True)
+class Position:
+    """Where a train is along a track.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Simulated time.
+    train, track : str
+        Names.
+    chainage_m, variance_m2 : float
+        Position along the track and its variance; infinite variance = unknown.
+    speed_mps, speed_variance_m2ps2 : float
+        Speed, positive with increasing chainage.
+    """
+
+    stamp_ns: int
+    train: str
+    track: str
+    chainage_m: float
+    variance_m2: float
+    speed_mps: float
+    speed_variance_m2ps2: float
+
+    @property
+    def known(self) -> bool:
+        """Whether the position may be used."""
+        return math.isfinite(self.variance_m2)
+
+    def to_msg(self) -> Odometry:
+        """Message form."""
+        message = Odometry()
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(self.stamp_ns, NANOSECONDS)
+        message.header.frame_id = self.track
+        message.child_frame_id = self.train
+        message.pose.pose.position.x = self.chainage_m
+        message.pose.pose.orientation.w = 1.0
+        message.pose.covariance[0] = self.variance_m2
+        message.twist.twist.linear.x = self.speed_mps
+        message.twist.covariance[0] = self.speed_variance_m2ps2
+        return message
+
+    def to_cdr(self) -> bytes:
+        """Serialised form."""
+        return bytes(serialize_message(self.to_msg()))
+
+    @classmethod
+    def from_msg(cls, message: Any) -> Position:
+        """View of a message."""
+        return cls(
+            to_ns(message.header.stamp),
+            message.child_frame_id,
+            message.header.frame_id,
+            float(message.pose.pose.position.x),
+            float(message.pose.covariance[0]),
+            float(message.twist.twist.linear.x),
+            float(message.twist.covariance[0]),
+        )
+
+
+class PositionWriter:
+    """Serialises the positions of one train on one track: only stamp and figures change."""
+
+    def __init__(self, train: str, track: str) -> None:
+        raw = Position(0, train, track, 0.0, 0.0, 0.0, 0.0).to_cdr()
+        self._raw = bytearray(raw)
+        tail = len(raw) - 8 * _TAIL_VALUES
+        self._places = tuple(tail + place for place in _PLACES)
+
+    def write(self, position: Position) -> bytes:
+        """Serialised position."""
+        _STAMP.pack_into(self._raw, 4, *divmod(position.stamp_ns, NANOSECONDS))
+        figures = (
+            position.chainage_m,
+            position.variance_m2,
+            position.speed_mps,
+            position.speed_variance_m2ps2,
+        )
+        for place, figure in zip(self._places, figures, strict=True):
+            _PACK.pack_into(self._raw, place, figure)
+        return bytes(self._raw)
+
+
+def figures_from_cdr(raw: bytes) -> tuple[int, str, tuple[float, float, float, float]]:
+    """Stamp [ns], track, and chainage, variance, speed, speed variance of a serialised position.
+
+    The part of a position that is read every tick, without unpacking the rest.
+    """
+    _, sec, nanosec, length = _HEAD.unpack_from(raw)
+    track = raw[_HEAD.size : _HEAD.size + length - 1].decode()
+    tail = len(raw) - 8 * _TAIL_VALUES
+    figures = tuple(_PACK.unpack_from(raw, tail + place)[0] for place in _PLACES)
+    return sec * NANOSECONDS + nanosec, track, figures

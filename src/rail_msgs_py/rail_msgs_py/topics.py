@@ -1,0 +1,250 @@
+"""Every topic of the corridor: name, type, view, quality of service, who sends, who reads.
+
+The only place that knows them. ``docs/topics.md`` is generated from this table, and a test
+compares it with a running graph.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any, Final
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry, Path
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Range
+from std_msgs.msg import Float64MultiArray, Header, String
+from visualization_msgs.msg import MarkerArray
+
+from rail_msgs_py.position import Position
+from rail_msgs_py.qos import ESTIMATE, LATCHED, STREAM
+from rail_msgs_py.range_reading import RangeReading
+from rail_msgs_py.table import Table
+from rail_msgs_py.waveform import Waveform
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One kind of topic.
+
+    Parameters
+    ----------
+    pattern : str
+        Absolute name with ``{placeholders}`` in names of their own level.
+    type : message class
+    qos : QoSProfile
+    view : class with ``from_msg``, or None
+        How ``rail echo`` decodes it.
+    sender, readers, text : str
+        For the documentation.
+    """
+
+    pattern: str
+    type: Any
+    qos: QoSProfile
+    view: Any
+    sender: str
+    readers: str
+    text: str
+
+    def name(self, **parts: object) -> str:
+        """Absolute name with the placeholders filled in.
+
+        >>> RANGE.name(site="wrs1", zone="zone1")
+        '/wayside/wrs1/zone1/range'
+        """
+        return self.pattern.format(**parts)
+
+    def matches(self, name: str) -> bool:
+        """Whether ``name`` is of this kind."""
+        expression = re.sub(r"\\\{\w+\\\}", r"[^/]+", re.escape(self.pattern))
+        return re.fullmatch(expression, name) is not None
+
+
+CLOCK: Final = Topic(
+    "/clock", Clock, STREAM, None, "world", "wrs, vrs, zone_controller", "Start of a tick."
+)
+STATE: Final = Topic(
+    "/world/state",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "world",
+    "radio_medium, the report",
+    "The truth of the tick, one row per train: where its antenna is, how it moves. "
+    "Equipment does not read it.",
+)
+TRUTH: Final = Topic(
+    "/world/{train}/odometry",
+    Odometry,
+    ESTIMATE,
+    Position,
+    "world",
+    "people",
+    "The truth of one train along its track, once a second of simulated time.",
+)
+LINKS: Final = Topic(
+    "/world/radio_medium/links",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "radio_medium",
+    "the report",
+    "The truth of the links of each train: carrier-to-noise ratio per sample of what its "
+    "transponder and its station received.",
+)
+FINISHED: Final = Topic(
+    "/world/finished",
+    Header,
+    LATCHED,
+    None,
+    "world",
+    "the launcher",
+    "The run has reached its end.",
+)
+CORRIDOR_PATH: Final = Topic(
+    "/world/{track}/path",
+    Path,
+    LATCHED,
+    None,
+    "world",
+    "RViz, Foxglove",
+    "Centre line of a track in `map`.",
+)
+CORRIDOR_MARKERS: Final = Topic(
+    "/world/markers",
+    MarkerArray,
+    LATCHED,
+    None,
+    "world",
+    "RViz, Foxglove",
+    "Masts of the wayside stations in `map`.",
+)
+DONE: Final = Topic(
+    "{node}/done",
+    Header,
+    STREAM,
+    None,
+    "radio_medium, zone_controller",
+    "world",
+    "The node has finished the tick of this stamp.",
+)
+OBSERVED: Final = Topic(
+    "/report/observed",
+    Header,
+    STREAM,
+    None,
+    "the report",
+    "world",
+    "The report has read everything up to this stamp; the world does not run far ahead of it.",
+)
+READY: Final = Topic(
+    "/ready",
+    String,
+    LATCHED,
+    None,
+    "every node",
+    "world",
+    "Name of a node whose topics are all connected.",
+)
+FAILED: Final = Topic(
+    "/failed",
+    DiagnosticStatus,
+    LATCHED,
+    None,
+    "whoever noticed: world, radio_medium, zone_controller, the launcher",
+    "world, radio_medium, zone_controller, the report",
+    "A node that is not waited for any longer, and why.",
+)
+DIAGNOSTICS: Final = Topic(
+    "/diagnostics",
+    DiagnosticArray,
+    LATCHED,
+    None,
+    "every node",
+    "people, the report",
+    "Health, published when it changes (REP 107).",
+)
+WRS_TX: Final = Topic(
+    "/wayside/{site}/{zone}/tx",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "wrs",
+    "radio_medium",
+    "What the antenna into the zone sends: the FM-carried tone on the zone's downlink channel.",
+)
+WRS_RX: Final = Topic(
+    "/wayside/{site}/{zone}/rx",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "radio_medium",
+    "wrs",
+    "What the same antenna receives on the zone's uplink channel.",
+)
+RANGE: Final = Topic(
+    "/wayside/{site}/{zone}/range",
+    Range,
+    STREAM,
+    RangeReading,
+    "wrs",
+    "zone_controller",
+    "Range to the train in the zone with its variance; inf = nothing heard, nan = unusable.",
+)
+VRS_RX: Final = Topic(
+    "/{train}/vrs/channel_{channel}/rx",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "radio_medium",
+    "vrs",
+    "What the train's antenna receives on one downlink channel.",
+)
+VRS_TX: Final = Topic(
+    "/{train}/vrs/tx",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "vrs",
+    "radio_medium",
+    "The transponded tone on the uplink channel in force.",
+)
+VRS_CHANNEL: Final = Topic(
+    "/{train}/vrs/channel",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "vrs",
+    "people, the report",
+    "Channel pair in force after the tick, and the level on each downlink channel.",
+)
+POSITION: Final = Topic(
+    "/wayside/zone_controller/{train}/position",
+    Odometry,
+    ESTIMATE,
+    Position,
+    "zone_controller",
+    "people, the report",
+    "Position of a train along its track by phase ranging; infinite variance = not known.",
+)
+
+ALL: Final[tuple[Topic, ...]] = (
+    *(CLOCK, STATE, TRUTH, LINKS, FINISHED, CORRIDOR_PATH, CORRIDOR_MARKERS, DONE, OBSERVED),
+    *(READY, FAILED, DIAGNOSTICS, WRS_TX, WRS_RX, RANGE, VRS_RX, VRS_TX, VRS_CHANNEL, POSITION),
+)
+
+STATE_COLUMNS: Final = (
+    *("path_m", "x_m", "y_m", "z_m", "heading_rad", "speed_mps", "acceleration_mps2"),
+    *("track_index", "chainage_m", "on_line"),
+)
+LINK_COLUMNS: Final = ("snr_down", "snr_up", "downlink_channel", "uplink_channel")
+
+
+def kind_of(name: str) -> Topic | None:
+    """The kind of a topic by its absolute name, None if it is not one of the corridor's."""
+    if name.endswith("/done"):
+        return DONE
+    return next((topic for topic in ALL if topic.matches(name)), None)

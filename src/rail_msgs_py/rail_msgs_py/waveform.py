@@ -1,0 +1,184 @@
+"""Sampled complex waveforms as ``std_msgs/Float64MultiArray``.
+
+Layout on the wire: dimensions ``antenna``, ``sample``, ``iq``; ``data_offset`` 4; the four
+leading values are stamp [s], sample rate [Hz], carrier [Hz] and channel number (0 = not a
+radio channel). A block without samples means silence.
+
+Waveforms are most of what the corridor sends, so beside the message form there is a direct
+one to and from the serialised bytes (CDR). It is the same wire format, one copy instead of
+four; any ROS 2 tool reads it.
+"""
+
+from __future__ import annotations
+
+import array
+import struct
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+
+from rail_msgs_py.stamps import CDR_LITTLE_ENDIAN, NANOSECONDS, seconds_to_ns
+
+HEADER_VALUES: Final = 4
+LABELS: Final = ("antenna", "sample", "iq")
+
+# CDR of the layout above: three labelled dimensions, the data offset, the element count.
+_PREFIX = struct.Struct("<4sI I8sII I7sxII I3sxII II4x")
+_HEADER = struct.Struct("<4d")
+_DATA_AT = _PREFIX.size + _HEADER.size
+
+
+@dataclass(frozen=True, eq=False)
+class Waveform:
+    """One block of one port.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Simulated time of the tick; the middle of the block.
+    sample_rate_hz, carrier_hz : float
+        Of the complex envelope.
+    channel : int
+        Radio channel number, 0 where there is none.
+    samples : complex array [antenna, sample]
+        In volts over 1 ohm scaled so that ``|s|^2`` is the power in mW; no sample = silence.
+    """
+
+    stamp_ns: int
+    sample_rate_hz: float
+    carrier_hz: float
+    channel: int
+    samples: NDArray[np.complex128]
+
+    @property
+    def silent(self) -> bool:
+        """Whether the block carries no sample."""
+        return self.samples.shape[1] == 0
+
+    @property
+    def power_dbm(self) -> float:
+        """Mean power of the block, -inf for silence."""
+        if self.silent:
+            return -np.inf
+        power_mw = float(np.mean(np.abs(self.samples) ** 2))
+        return float(10.0 * np.log10(power_mw)) if power_mw > 0.0 else -np.inf
+
+    def to_msg(self) -> Float64MultiArray:
+        """Message form."""
+        antennas, count = self.samples.shape
+        message = Float64MultiArray()
+        sizes = (antennas, count, 2)
+        strides = (antennas * count * 2, count * 2, 2)
+        message.layout.dim = [
+            MultiArrayDimension(label=label, size=size, stride=stride)
+            for label, size, stride in zip(LABELS, sizes, strides, strict=True)
+        ]
+        message.layout.data_offset = HEADER_VALUES
+        data = array.array("d")
+        data.frombytes(self._header() + _sample_bytes(self.samples))
+        message.data = data
+        return message
+
+    def to_cdr(self) -> bytes:
+        """Serialised form."""
+        antennas, count = self.samples.shape
+        return (
+            _PREFIX.pack(
+                CDR_LITTLE_ENDIAN,
+                3,
+                *(8, b"antenna\0", antennas, antennas * count * 2),
+                *(7, b"sample\0", count, count * 2),
+                *(3, b"iq\0", 2, 2),
+                HEADER_VALUES,
+                HEADER_VALUES + 2 * antennas * count,
+            )
+            + self._header()
+            + _sample_bytes(self.samples)
+        )
+
+    def _header(self) -> bytes:
+        return _HEADER.pack(
+            self.stamp_ns / NANOSECONDS, self.sample_rate_hz, self.carrier_hz, float(self.channel)
+        )
+
+    @classmethod
+    def from_msg(cls, message: Any) -> Waveform:
+        """View of a message.
+
+        Raises
+        ------
+        ValueError
+            If the layout is not that of a waveform.
+        """
+        labels = tuple(dim.label for dim in message.layout.dim)
+        if labels != LABELS or message.layout.data_offset != HEADER_VALUES:
+            raise ValueError(f"not a waveform: dimensions {labels}")
+        antennas, count, parts = (int(dim.size) for dim in message.layout.dim)
+        data = np.frombuffer(message.data, dtype=np.float64)
+        if parts != 2 or data.size != HEADER_VALUES + 2 * antennas * count:
+            raise ValueError(f"not a waveform: {data.size} values for {antennas} x {count} samples")
+        stamp_s, sample_rate_hz, carrier_hz, channel = data[:HEADER_VALUES]
+        samples = data[HEADER_VALUES:].view(np.complex128).reshape(antennas, count)
+        return cls(
+            seconds_to_ns(float(stamp_s)),
+            float(sample_rate_hz),
+            float(carrier_hz),
+            int(channel),
+            samples,
+        )
+
+    @classmethod
+    def from_cdr(cls, raw: bytes) -> Waveform:
+        """View of a serialised message; the samples share its memory and are read-only.
+
+        Raises
+        ------
+        ValueError
+            If the layout is not that of a waveform.
+        """
+        if len(raw) < _DATA_AT or raw[:8] != _MAGIC or raw[12:20] != b"antenna\0":
+            return cls.from_msg(deserialize_message(raw, Float64MultiArray))
+        fields = _PREFIX.unpack_from(raw)
+        antennas, count = fields[4], fields[8]
+        if fields[15] != HEADER_VALUES + 2 * antennas * count:
+            return cls.from_msg(deserialize_message(raw, Float64MultiArray))
+        stamp_s, sample_rate_hz, carrier_hz, channel = _HEADER.unpack_from(raw, _PREFIX.size)
+        samples = np.frombuffer(raw, np.complex128, antennas * count, _DATA_AT)
+        return cls(
+            seconds_to_ns(stamp_s),
+            sample_rate_hz,
+            carrier_hz,
+            int(channel),
+            samples.reshape(antennas, count),
+        )
+
+
+_MAGIC = CDR_LITTLE_ENDIAN + b"\x03\x00\x00\x00"
+
+
+def _sample_bytes(samples: NDArray[np.complex128]) -> bytes:
+    return np.ascontiguousarray(samples, dtype=np.complex128).tobytes()
+
+
+def silence(stamp_ns: int, sample_rate_hz: float, carrier_hz: float, channel: int) -> Waveform:
+    """Block of a port that does not transmit, or hears nothing."""
+    return Waveform(
+        stamp_ns, sample_rate_hz, carrier_hz, channel, np.empty((1, 0), dtype=np.complex128)
+    )
+
+
+class RepeatedBlock:
+    """A block that a transmitter sends again every tick with nothing new but its stamp."""
+
+    def __init__(self, block: Waveform) -> None:
+        raw = block.to_cdr()
+        self._before = raw[: _PREFIX.size]
+        self._after = raw[_PREFIX.size + 8 :]
+
+    def at(self, stamp_ns: int) -> bytes:
+        """Serialised block of the tick at ``stamp_ns``."""
+        return b"".join((self._before, struct.pack("<d", stamp_ns / NANOSECONDS), self._after))

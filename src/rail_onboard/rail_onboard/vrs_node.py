@@ -1,0 +1,151 @@
+"""Vehicle station: hears every downlink channel, returns the tone on the pair in force.
+
+Topics in: ``channel_<n>/rx`` for every downlink channel. Topics out: ``tx``, ``channel``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from rail_msgs_py import topics
+from rail_msgs_py.inbox import TickInbox
+from rail_msgs_py.node import Equipment
+from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.signal_parameters import SignalParameters, signal_of
+from rail_msgs_py.standalone import run_node
+from rail_msgs_py.table import TableWriter
+from rail_msgs_py.waveform import Waveform, silence
+from rail_signals.line_receiver import LineReceiver, ToneEstimate
+from rail_signals.transponder import transpond
+
+from rail_onboard.channel_selector import ChannelSelector
+
+
+@dataclass(frozen=True)
+class VrsParameters(SignalParameters):
+    """Parameters of a vehicle station."""
+
+    downlink_channels: tuple[int, ...] = parameter((1, 3), "channels it hears", low=1)
+    uplink_channels: tuple[int, ...] = parameter((2, 4), "the channel paired with each", low=1)
+    uplink_carriers_hz: tuple[float, ...] = parameter(
+        (2.405e9, 2.415e9), "carrier of each uplink channel", unit="Hz", low=0.0
+    )
+    power_dbm: float = parameter(-10.0, "transmit power", unit="dBm", low=-100.0, high=60.0)
+    transponder_delay_s: float = parameter(
+        1e-6, "delay of this unit from reception to transmission", unit="s", low=0.0, high=1e-3
+    )
+    delay_trim_s: float = parameter(
+        0.0, "added on the bench to bring it to that of the fleet", unit="s", low=-1e-3, high=1e-3
+    )
+
+
+class VrsNode(Equipment):
+    """Vehicle station as a managed node."""
+
+    def __init__(
+        self,
+        name: str = "vrs",
+        *,
+        namespace: str = "/train_1",
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(
+            name, namespace, context=context, parameters=parameters, services=services
+        )
+        self._p = declare(self, VrsParameters)
+        channels = self._p.downlink_channels
+        if not len(channels) == len(self._p.uplink_channels) == len(self._p.uplink_carriers_hz):
+            raise ParameterError(
+                f"{self.get_name()}: uplink_channels: {self._p.uplink_channels}: every downlink "
+                "channel needs one uplink channel and its carrier"
+            )
+        self._signal = signal_of(self._p)
+        self._receiver = LineReceiver(self._signal)
+        self._selector = ChannelSelector(dict(zip(channels, self._p.uplink_channels, strict=True)))
+        self._carriers_hz = dict(
+            zip(self._p.uplink_channels, self._p.uplink_carriers_hz, strict=True)
+        )
+        self._amplitude = 10.0 ** (self._p.power_dbm / 20.0)
+        self._delay_s = self._p.transponder_delay_s + self._p.delay_trim_s
+        train = namespace.strip("/")
+        self._inbox: TickInbox[Waveform] = TickInbox(str(channel) for channel in channels)
+        for channel in channels:
+            self.stream_in(
+                topics.VRS_RX,
+                lambda raw, channel=channel: self._receive(channel, raw),
+                train=train,
+                channel=channel,
+            )
+        self._send = self.stream_out(topics.VRS_TX, train=train)
+        self._channel = self.publisher(topics.VRS_CHANNEL, train=train).publish
+        columns = ("downlink", "uplink", *(f"level_{channel}_dbm" for channel in channels))
+        self._channel_table = TableWriter((train,), columns)
+        self._figures = np.zeros((1, len(columns)))
+        self.announce_when_connected()
+
+    def _receive(self, channel: int, raw: bytes) -> None:
+        block = Waveform.from_cdr(raw)
+        self._inbox.put(block.stamp_ns, str(channel), block)
+        if self._inbox.complete:
+            stamp_ns, blocks = self._inbox.take()
+            self._answer(stamp_ns, {block.channel: block for block in blocks.values()})
+
+    def _answer(self, stamp_ns: int, blocks: Mapping[int, Waveform]) -> None:
+        heard: dict[int, ToneEstimate] = {}
+        if self.switched_on:
+            for channel, block in blocks.items():
+                if not block.silent:
+                    estimate = self._receiver.estimate(block.samples[0])
+                    if estimate.detected:
+                        heard[channel] = estimate
+        levels = {
+            channel: 20.0 * float(np.log10(estimate.amplitude))
+            for channel, estimate in heard.items()
+        }
+        downlink = self._selector.update(levels)
+        self._send(self._reply(stamp_ns, heard.get(downlink) if downlink is not None else None))
+        self._publish_channel(stamp_ns, levels)
+        self._report(stamp_ns, downlink in heard, any(not b.silent for b in blocks.values()))
+
+    def _reply(self, stamp_ns: int, estimate: ToneEstimate | None) -> bytes:
+        uplink = self._selector.uplink
+        if uplink is None:
+            uplink = self._p.uplink_channels[0]
+            estimate = None
+        radio = (self._signal.sample_rate_hz, self._carriers_hz[uplink], uplink)
+        if estimate is None:
+            return silence(stamp_ns, *radio).to_cdr()
+        samples = transpond(estimate, self._signal, self._delay_s) * self._amplitude
+        return Waveform(stamp_ns, *radio, samples[None, :]).to_cdr()
+
+    def _publish_channel(self, stamp_ns: int, levels: Mapping[int, float]) -> None:
+        self._figures[0, 0] = self._selector.downlink or 0
+        self._figures[0, 1] = self._selector.uplink or 0
+        for column, channel in enumerate(self._p.downlink_channels, start=2):
+            self._figures[0, column] = levels.get(channel, -np.inf)
+        self._channel(self._channel_table.write(stamp_ns, self._figures))
+
+    def _report(self, stamp_ns: int, answering: bool, hearing: bool) -> None:
+        if answering or not self.switched_on:
+            self.report(DiagnosticStatus.OK, "ranging", "answering", stamp_ns=stamp_ns)
+        elif hearing:
+            self.report(
+                DiagnosticStatus.WARN, "ranging", "cannot read the tone", stamp_ns=stamp_ns
+            )
+        else:
+            self.report(DiagnosticStatus.WARN, "ranging", "hears no station", stamp_ns=stamp_ns)
+
+
+def main() -> None:
+    """Run a vehicle station on its own."""
+    run_node(VrsNode)
+
+
+if __name__ == "__main__":
+    main()

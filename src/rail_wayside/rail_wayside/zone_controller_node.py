@@ -1,0 +1,187 @@
+"""Zone controller: turns the ranges of all stations into positions of all trains.
+
+Topics in: every ``range``. Topics out: ``~/<train>/position``, ``~/done``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from rail_msgs_py import topics
+from rail_msgs_py.failures import FailureWatch
+from rail_msgs_py.headers import header_to_cdr
+from rail_msgs_py.inbox import TickInbox
+from rail_msgs_py.node import CorridorNode
+from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.position import Position, PositionWriter
+from rail_msgs_py.range_reading import RangeReading
+from rail_msgs_py.standalone import run_node
+
+from rail_wayside.zone_map import Zone, ZoneMap
+from rail_wayside.zone_tracking import Fix, Reading, ZoneTracker
+
+WATCH_PERIOD_S = 0.1
+
+
+@dataclass(frozen=True)
+class ZoneControllerParameters:
+    """Parameters of the zone controller; arrays over the zones unless said otherwise."""
+
+    zones: tuple[str, ...] = parameter((), "names of the zones")
+    sites: tuple[str, ...] = parameter((), "station that looks into each zone")
+    tracks: tuple[str, ...] = parameter((), "track of each zone")
+    starts_m: tuple[float, ...] = parameter((), "chainage of each zone's start", unit="m")
+    ends_m: tuple[float, ...] = parameter((), "chainage of each zone's end", unit="m")
+    follows_from: tuple[str, ...] = parameter((), "zones at whose end another begins, by pair")
+    follows_to: tuple[str, ...] = parameter((), "zones that begin there, by pair")
+    table_sizes: tuple[int, ...] = parameter((), "points of each zone's table", low=2)
+    table_chainage_m: tuple[float, ...] = parameter(
+        (), "chainages of the tables, one zone after the other", unit="m"
+    )
+    table_distance_m: tuple[float, ...] = parameter(
+        (), "distances from mast to train antenna at these chainages", unit="m"
+    )
+    trains: tuple[str, ...] = parameter((), "trains, in the order they enter the line")
+    entry_zones: tuple[str, ...] = parameter((), "zone where each train is first seen")
+    timeout_s: float = parameter(
+        3.0, "wall time after which a reading is given up", unit="s", low=0.05, high=3600.0
+    )
+
+
+def zone_map_of(p: ZoneControllerParameters) -> ZoneMap:
+    """Zones and their order from the flat parameters.
+
+    Raises
+    ------
+    ParameterError
+        If the arrays do not fit together.
+    """
+    count = len(p.zones)
+    for name in ("sites", "tracks", "starts_m", "ends_m", "table_sizes"):
+        if len(getattr(p, name)) != count:
+            raise ParameterError(f"{name}: {len(getattr(p, name))} entries for {count} zones")
+    total = sum(p.table_sizes)
+    if not len(p.table_chainage_m) == len(p.table_distance_m) == total:
+        raise ParameterError(f"table_chainage_m: {len(p.table_chainage_m)} points, not {total}")
+    following: dict[str, list[str]] = {}
+    for before, after in zip(p.follows_from, p.follows_to, strict=True):
+        following.setdefault(before, []).append(after)
+    cuts = np.cumsum(p.table_sizes)[:-1]
+    chainages = np.split(np.asarray(p.table_chainage_m), cuts)
+    distances = np.split(np.asarray(p.table_distance_m), cuts)
+    zones = [
+        Zone(*row)
+        for row in zip(
+            p.zones, p.sites, p.tracks, p.starts_m, p.ends_m, chainages, distances, strict=True
+        )
+    ]
+    return ZoneMap(zones, following)
+
+
+class ZoneControllerNode(CorridorNode):
+    """The zone controller as a node."""
+
+    def __init__(
+        self,
+        *,
+        namespace: str = "/wayside",
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(
+            "zone_controller", namespace, context=context, parameters=parameters, services=services
+        )
+        self._p = declare(self, ZoneControllerParameters)
+        zone_map = zone_map_of(self._p)
+        trains = list(zip(self._p.trains, self._p.entry_zones, strict=True))
+        self._tracker = ZoneTracker(zone_map, trains)
+        self._positions = {
+            name: self.publisher(topics.POSITION, train=name).publish for name in self._p.trains
+        }
+        self._writers: dict[tuple[str, str], PositionWriter] = {}
+        owners = {zone.name: f"/wayside/{zone.site}" for zone in zone_map.zones.values()}
+        self._inbox: TickInbox[RangeReading] = TickInbox(owners)
+        self._watch = FailureWatch(self, owners, self._drop)
+        self._waiting_since_s = float("inf")
+        for zone in zone_map.zones.values():
+            self.stream_in(
+                topics.RANGE,
+                lambda raw, zone=zone.name: self._on_range(zone, raw),
+                site=zone.site,
+                zone=zone.name,
+            )
+        self._done = self.stream_out(topics.DONE, node=self.get_fully_qualified_name())
+        self.every(WATCH_PERIOD_S, self._check)
+        self.announce_when_connected()
+
+    def _on_range(self, zone: str, raw: bytes) -> None:
+        reading = RangeReading.from_cdr(raw)
+        if self._waiting_since_s == float("inf"):
+            self._waiting_since_s = self.steady_s()
+        self._inbox.put(reading.stamp_ns, zone, reading)
+        self._advance()
+
+    def _advance(self) -> None:
+        while self._inbox.complete:
+            self._tick_over()
+
+    def _tick_over(self) -> None:
+        stamp_ns, readings = self._inbox.take()
+        self._waiting_since_s = float("inf")
+        fixes = self._tracker.update(
+            stamp_ns * 1e-9,
+            {zone: Reading(r.range_m, r.variance_m2) for zone, r in readings.items()},
+        )
+        for fix in fixes:
+            self._publish(stamp_ns, fix)
+        self._report_zones(stamp_ns)
+        self._done(header_to_cdr(stamp_ns))
+
+    def _publish(self, stamp_ns: int, fix: Fix) -> None:
+        key = (fix.train, fix.track)
+        if key not in self._writers:
+            self._writers[key] = PositionWriter(*key)
+        position = Position(
+            stamp_ns,
+            fix.train,
+            fix.track,
+            fix.chainage_m,
+            fix.variance_m2,
+            fix.speed_mps,
+            fix.speed_variance_m2ps2,
+        )
+        self._positions[fix.train](self._writers[key].write(position))
+        level = DiagnosticStatus.WARN if fix.reason else DiagnosticStatus.OK
+        self.report(level, fix.train, fix.reason or "position known", stamp_ns=stamp_ns)
+
+    def _report_zones(self, stamp_ns: int) -> None:
+        unknown = ", ".join(self._tracker.unidentified)
+        self.report(
+            DiagnosticStatus.WARN if unknown else DiagnosticStatus.OK,
+            "train describer",
+            f"unidentified train in {unknown}" if unknown else "every train is identified",
+            stamp_ns=stamp_ns,
+        )
+
+    def _check(self) -> None:
+        waited_s = self.steady_s() - self._waiting_since_s
+        if waited_s > self._p.timeout_s:
+            self._watch.give_up(self._inbox.missing, self._p.timeout_s)
+
+    def _drop(self, zones: tuple[str, ...]) -> None:
+        self._inbox.drop(zones)
+        self._advance()
+
+
+def main() -> None:
+    """Run the zone controller on its own."""
+    run_node(ZoneControllerNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,301 @@
+"""The radio medium: everything between a transmitting and a receiving antenna.
+
+Free-space loss at 1 m, then the path-loss exponent; parabolic antenna patterns; the exact
+fractional delay of the envelope and the carrier phase of the same path; Doppler shift and
+oscillator offsets; the sum of all transmitters in reach on the channel; thermal noise.
+
+No station reaches past two zones (Jeong et al., section 2.5): beyond ``reach_m`` of a
+station antenna a link does not exist, in either direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
+from rail_signals.delay import fractional_delay
+from rail_signals.phasors import cis, rotation
+
+from rail_world.radio_description import AntennaPattern, RadioDescription
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+THERMAL_NOISE_DBM_PER_HZ = -173.975  # k T at 290 K
+_MIN_DISTANCE_M = 1.0
+
+
+@dataclass(frozen=True)
+class TrainAntennas:
+    """Where the train antennas are: arrays over the trains in the order of the description.
+
+    ``position_m`` and ``velocity_mps`` [train, 3]; ``heading_rad`` [train] of the track
+    towards increasing chainage, anticlockwise from east.
+    """
+
+    position_m: FloatArray
+    velocity_mps: FloatArray
+    heading_rad: FloatArray
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Geometry of one tick between all station and train antennas, arrays [station, train]."""
+
+    distance_m: FloatArray
+    closing_speed_mps: FloatArray
+    gain_db: FloatArray
+    in_reach: NDArray[np.bool_]
+    train_position_m: FloatArray
+    train_axis: FloatArray
+
+
+@dataclass(frozen=True)
+class Reception:
+    """What one antenna receives on one channel.
+
+    ``samples`` in sqrt(mW); ``signal_mw`` of the strongest source, which is the pair
+    ``source`` (station antenna, train); ``noise_mw`` of thermal noise and jammers.
+    """
+
+    samples: ComplexArray
+    signal_mw: float
+    noise_mw: float
+    source: tuple[int, int]
+
+    @property
+    def snr(self) -> float:
+        """Carrier-to-noise ratio per sample, linear."""
+        return self.signal_mw / self.noise_mw
+
+
+def pattern_gain_db(pattern: AntennaPattern, cos_angle: FloatArray) -> FloatArray:
+    """Gain off the axis: ``G - min(12 (angle / beamwidth)^2, front-to-back)``."""
+    angle_deg = np.degrees(np.arccos(np.clip(cos_angle, -1.0, 1.0)))
+    roll_off_db = 12.0 * (angle_deg / pattern.beamwidth_deg) ** 2
+    return pattern.gain_dbi - np.minimum(roll_off_db, pattern.front_to_back_db)
+
+
+class RadioMedium:
+    """Propagates the blocks of one tick.
+
+    Parameters
+    ----------
+    description : RadioDescription
+    seed : int
+        Of the noise and the oscillators.
+    """
+
+    def __init__(self, description: RadioDescription, seed: int) -> None:
+        self.description = description
+        stations = description.stations
+        self._positions_m = np.array([a.position_m for a in stations]).reshape(-1, 3)
+        boresight = np.array([a.boresight for a in stations]).reshape(-1, 3)
+        self._boresight = boresight / np.linalg.norm(boresight, axis=1, keepdims=True)
+        self._reach_m = np.array([a.reach_m for a in stations])
+        self._downlink = np.array([a.downlink_channel for a in stations], dtype=np.int64)
+        self._uplink = np.array([a.uplink_channel for a in stations], dtype=np.int64)
+        self._sites = [a.site for a in stations]
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 0])))
+        sigma = description.oscillator_ppm * 1e-6
+        # A site has one oscillator for all its antennas.
+        by_site = {site: sigma * rng.standard_normal() for site in dict.fromkeys(self._sites)}
+        self._station_offset = np.array([by_site[site] for site in self._sites])
+        self._train_offset = sigma * rng.standard_normal(len(description.trains))
+        self._loss_at_1m_db = {
+            channel: 20.0 * np.log10(4.0 * np.pi * hz / SPEED_OF_LIGHT_M_PER_S)
+            for channel, hz in description.carriers_hz.items()
+        }
+        self.noise_mw = 10.0 ** (
+            (THERMAL_NOISE_DBM_PER_HZ + description.noise_figure_db) / 10.0
+        ) * (description.sample_rate_hz)
+        self._floor_mw = self.noise_mw * 10.0 ** (description.sensitivity_db / 10.0)
+        self._noise = NoiseSource(seed, description.samples)
+
+    def paths(self, trains: TrainAntennas) -> Paths:
+        """Distances, closing speeds and antenna gains of one tick."""
+        line = trains.position_m[None, :, :] - self._positions_m[:, None, :]
+        distance_m = np.maximum(np.sqrt(np.einsum("stk,stk->st", line, line)), _MIN_DISTANCE_M)
+        unit = line / distance_m[..., None]
+        station_cos = np.einsum("stk,sk->st", unit, self._boresight)
+        # The train's antenna looks back to the station of its zone.
+        heading = trains.heading_rad
+        axis = -np.stack((np.cos(heading), np.sin(heading), np.zeros_like(heading)), axis=1)
+        train_cos = -np.einsum("stk,tk->st", unit, axis)
+        radio = self.description
+        gain_db = (
+            pattern_gain_db(radio.station_pattern, station_cos)
+            + pattern_gain_db(radio.train_pattern, train_cos)
+            - 10.0 * radio.path_loss_exponent * np.log10(distance_m)
+        )
+        closing = -np.einsum("stk,tk->st", unit, trains.velocity_mps)
+        in_reach = distance_m <= self._reach_m[:, None]
+        return Paths(distance_m, closing, gain_db, in_reach, trains.position_m, axis)
+
+    def dead_stations(self, time_s: float) -> set[int]:
+        """Indices of station antennas that are dead at ``time_s``."""
+        dead = {
+            fault.station
+            for fault in self.description.faults
+            if fault.kind == "dead_station" and fault.from_s <= time_s < fault.to_s
+        }
+        return {index for index, site in enumerate(self._sites) if site in dead}
+
+    def downlink(
+        self, tick: int, time_s: float, paths: Paths, blocks: dict[int, ComplexArray]
+    ) -> dict[tuple[int, int], Reception]:
+        """What each train hears on each channel.
+
+        Parameters
+        ----------
+        tick, time_s : int, float
+            Number and simulated time of the tick.
+        paths : Paths
+        blocks : dict
+            Index of the station antenna -> samples sent, sqrt(mW); silent ones are missing.
+
+        Returns
+        -------
+        dict of (train index, channel) -> Reception; pairs that hear nothing are missing.
+        """
+        dead = self.dead_stations(time_s)
+        sources: dict[tuple[int, int], list[tuple[int, int]]] = {}
+        for station in sorted(blocks.keys() - dead):
+            channel = int(self._downlink[station])
+            for train in np.flatnonzero(paths.in_reach[station]):
+                sources.setdefault((int(train), channel), []).append((station, int(train)))
+        return self._receive(tick, time_s, 1, paths, sources, blocks, uplink=False)
+
+    def uplink(
+        self,
+        tick: int,
+        time_s: float,
+        paths: Paths,
+        blocks: dict[int, tuple[int, ComplexArray]],
+    ) -> dict[tuple[int, int], Reception]:
+        """What each station antenna hears on its uplink channel.
+
+        ``blocks``: train index -> (channel, samples sent).
+        Returns a dict of (station antenna index, channel) -> Reception.
+        """
+        dead = self.dead_stations(time_s)
+        sources: dict[tuple[int, int], list[tuple[int, int]]] = {}
+        for train in sorted(blocks):
+            channel = blocks[train][0]
+            hears = paths.in_reach[:, train] & (self._uplink == channel)
+            for station in np.flatnonzero(hears):
+                if int(station) not in dead:
+                    key = (int(station), channel)
+                    sources.setdefault(key, []).append((int(station), train))
+        sent = {train: samples for train, (_, samples) in blocks.items()}
+        return self._receive(tick, time_s, 2, paths, sources, sent, uplink=True)
+
+    def _receive(
+        self,
+        tick: int,
+        time_s: float,
+        stage: int,
+        paths: Paths,
+        sources: dict[tuple[int, int], list[tuple[int, int]]],
+        blocks: dict[int, ComplexArray],
+        *,
+        uplink: bool,
+    ) -> dict[tuple[int, int], Reception]:
+        radio = self.description
+        links: list[tuple[tuple[int, int], int, int, int]] = []
+        for port, pairs in sources.items():
+            for station, train in pairs:
+                sender = train if uplink else station
+                links.append((port, station, train, sender))
+        received: dict[tuple[int, int], Reception] = {}
+        if not links:
+            return received
+        channels = [port[1] for port, *_ in links]
+        carrier_hz = np.array([radio.carriers_hz[channel] for channel in channels])
+        loss_db = np.array([self._loss_at_1m_db[channel] for channel in channels])
+        s = np.array([station for _, station, *_ in links])
+        t = np.array([train for _, _, train, _ in links])
+        sent = np.stack([blocks[sender] for *_, sender in links])
+        gain_db = paths.gain_db[s, t] - loss_db
+        sent_mw = np.einsum("ln,ln->l", sent, sent.conj()).real / sent.shape[1]
+        power_mw = sent_mw * 10.0 ** (gain_db / 10.0)
+        audible = power_mw >= self._floor_mw
+        if not audible.any():
+            return received
+        delay_s = paths.distance_m[s, t] / SPEED_OF_LIGHT_M_PER_S
+        doppler_hz = carrier_hz * paths.closing_speed_mps[s, t] / SPEED_OF_LIGHT_M_PER_S
+        offsets = self._station_offset[s] - self._train_offset[t]
+        shift_hz = doppler_hz + carrier_hz * (-offsets if uplink else offsets)
+        amplitude = 10.0 ** (gain_db / 20.0)
+        carrier_phase = -2.0 * np.pi * np.mod(carrier_hz * delay_s, 1.0)
+        keep = np.flatnonzero(audible)
+        arrived = fractional_delay(sent[keep], delay_s[keep], radio.sample_rate_hz)
+        arrived *= rotation(shift_hz[keep] / radio.sample_rate_hz, sent.shape[1])
+        arrived *= (amplitude[keep] * cis(carrier_phase[keep]))[:, None]
+        heard: dict[tuple[int, int], list[int]] = {}
+        for row, link in enumerate(keep):
+            heard.setdefault(links[link][0], []).append(row)
+        for port, rows in heard.items():
+            total = arrived[rows[0]]
+            for row in rows[1:]:
+                total += arrived[row]
+            strongest = max((keep[row] for row in rows), key=lambda link: power_mw[link])
+            noise_mw = self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
+            noise = self._noise.block(stage, port[0] * 128 + port[1], tick)
+            noise *= np.sqrt(noise_mw / 2.0)
+            total += noise
+            received[port] = Reception(
+                total, float(power_mw[strongest]), noise_mw, links[strongest][1:3]
+            )
+        return received
+
+    def _jamming_mw(
+        self, time_s: float, port: tuple[int, int], paths: Paths, *, uplink: bool
+    ) -> float:
+        """Noise power that the jammers on the channel bring into a receiving antenna."""
+        radio = self.description
+        total = 0.0
+        for fault in radio.faults:
+            if fault.kind != "jam" or not fault.from_s <= time_s < fault.to_s:
+                continue
+            if fault.channel != port[1]:
+                continue
+            if uplink:
+                here, axis = self._positions_m[port[0]], self._boresight[port[0]]
+                pattern = radio.station_pattern
+            else:
+                here, axis = paths.train_position_m[port[0]], paths.train_axis[port[0]]
+                pattern = radio.train_pattern
+            line = np.asarray(fault.position_m) - here
+            distance_m = max(float(np.sqrt(line @ line)), _MIN_DISTANCE_M)
+            gain_db = float(pattern_gain_db(pattern, line @ axis / distance_m))
+            loss_db = self._loss_at_1m_db[port[1]] + 10.0 * (
+                radio.path_loss_exponent * np.log10(distance_m)
+            )
+            total += 10.0 ** ((fault.power_dbm + gain_db - loss_db) / 10.0)
+        return total
+
+
+class NoiseSource:
+    """White complex noise that depends on nothing but (seed, stage, port, tick).
+
+    A counter-based generator is set to a place of its own for each block, so that neither
+    the order of the blocks nor a missing one changes any other.
+    """
+
+    def __init__(self, seed: int, samples: int) -> None:
+        self._bits = np.random.Philox(np.random.SeedSequence([seed, 1]))
+        self._state = self._bits.state
+        self._generator = np.random.Generator(self._bits)
+        self._shape = (samples, 2)
+
+    def block(self, stage: int, port: int, tick: int) -> ComplexArray:
+        """Complex noise with unit variance in each part."""
+        self._state["state"]["counter"][:] = (0, stage, port, tick)
+        self._state["buffer_pos"] = 4
+        self._state["has_uint32"] = 0
+        self._bits.state = self._state
+        parts = self._generator.standard_normal(self._shape, dtype=np.float32)
+        return parts.astype(np.float64).view(np.complex128)[:, 0]

@@ -1,0 +1,84 @@
+"""All trains of the corridor: stepped together, their truth as one table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rail_world.train_description import TrainDescription
+from rail_world.motion import TrainMotion
+from rail_world.network import Network
+from rail_world.route import Route
+
+
+class Traffic:
+    """The trains in the order of their description.
+
+    Parameters
+    ----------
+    descriptions : sequence of TrainDescription
+    network : Network
+    tick_s : float
+        Step.
+    """
+
+    def __init__(
+        self, descriptions: Sequence[TrainDescription], network: Network, tick_s: float
+    ) -> None:
+        self.names = tuple(description.name for description in descriptions)
+        self._trains = [TrainMotion(d, network, tick_s) for d in descriptions]
+        self._descriptions = tuple(descriptions)
+        self._track_index = {name: index for index, name in enumerate(network.tracks)}
+        # Trains with the same route are located in one call.
+        groups: dict[tuple[str, ...], list[int]] = {}
+        for index, train in enumerate(self._trains):
+            groups.setdefault(tuple(train.route.tracks), []).append(index)
+        self._groups: list[tuple[Route, list[int]]] = [
+            (self._trains[members[0]].route, members) for members in groups.values()
+        ]
+        self._state = np.zeros((len(self._trains), 10))
+
+    def step(self) -> None:
+        """Move every train by one tick."""
+        for train in self._trains:
+            train.step()
+
+    def state(self) -> NDArray[np.float64]:
+        """The truth [train, column], columns as ``rail_msgs_py.topics.STATE_COLUMNS``.
+
+        The array is reused: copy what must last.
+        """
+        state = self._state
+        for index, train in enumerate(self._trains):
+            state[index, 0] = train.path_m
+            state[index, 5] = train.speed_mps
+            state[index, 6] = train.acceleration_mps2
+            state[index, 7] = self._track_index[train.track]
+            state[index, 8] = train.chainage_m
+            state[index, 9] = self._on_line(index)
+        for route, members in self._groups:
+            pose = route.pose(state[members, 0])
+            state[members, 1] = pose.x_m
+            state[members, 2] = pose.y_m
+            state[members, 3] = pose.z_m
+            state[members, 4] = pose.heading_rad
+        return state
+
+    def places(self) -> Iterator[tuple[str, str, float, float]]:
+        """Name, track, chainage [m] and speed [m/s] of each train."""
+        for name, train in zip(self.names, self._trains, strict=True):
+            yield name, train.track, train.chainage_m, train.speed_mps
+
+    @property
+    def all_arrived(self) -> bool:
+        """Whether no train has anywhere left to go."""
+        return all(train.state == "arrived" for train in self._trains)
+
+    def _on_line(self, index: int) -> float:
+        """1 where the train is on the line: not before it enters, nor after it has left."""
+        train, description = self._trains[index], self._descriptions[index]
+        if description.enters_at_departure and train.state == "waiting":
+            return 0.0
+        return 0.0 if description.leaves_on_arrival and train.state == "arrived" else 1.0

@@ -1,0 +1,47 @@
+"""The truth as one JSON file, which the world and its media read when they start."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from rail_world.description import JunctionDescription, TrackDescription
+from rail_world.train_description import TrainDescription
+from rail_world.network import Network, build_network
+from rail_world.radio_description import RadioDescription
+
+
+class WorldFile(BaseModel):
+    """Tracks, trains and media of one run.
+
+    Paths in it are absolute: the file may lie anywhere.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    seed: int = Field(ge=0)
+    tick_s: float = Field(gt=0.0)
+    tracks: dict[str, TrackDescription]
+    junctions: tuple[JunctionDescription, ...] = ()
+    trains: tuple[TrainDescription, ...]
+    radio: RadioDescription
+
+    @property
+    def tick_ns(self) -> int:
+        """Length of a tick in nanoseconds."""
+        return round(self.tick_s * 1e9)
+
+    def network(self) -> Network:
+        """The tracks, joined."""
+        return build_network(self.tracks, self.junctions)
+
+
+def read_world_file(path: str) -> WorldFile:
+    """Read and validate a world file.
+
+    Raises
+    ------
+    OSError, pydantic.ValidationError
+    """
+    return WorldFile.model_validate_json(Path(path).read_bytes())

@@ -1,0 +1,243 @@
+"""The world: moves the trains, publishes the truth, and drives the ticks.
+
+Topics out: ``/clock``, ``/world/state``, ``/world/<train>/odometry``, ``/world/<track>/path``,
+``/world/markers``, ``/world/finished``. Topics in: ``<sink>/done``, ``/report/observed``,
+``/ready``, ``/failed``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rail_msgs_py import topics
+from rail_msgs_py.failures import FailureWatch
+from rail_msgs_py.inbox import TickInbox
+from rail_msgs_py.node import CorridorNode
+from rail_msgs_py.parameters import declare, parameter
+from rail_msgs_py.position import Position, PositionWriter
+from rail_msgs_py.qos import OBSERVER_WINDOW_TICKS
+from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
+from rail_msgs_py.standalone import run_node
+from rail_msgs_py.table import TableWriter
+from std_msgs.msg import Header
+
+from rail_world.corridor_map import markers, path_of
+from rail_world.traffic import Traffic
+from rail_world.world_file import read_world_file
+
+WATCH_PERIOD_S = 0.1
+
+
+@dataclass(frozen=True)
+class WorldParameters:
+    """Parameters of the world."""
+
+    world_file: str = parameter("", "JSON file with tracks, trains and media")
+    ticks: int = parameter(0, "length of the run; 0 = until stopped", unit="ticks", low=0)
+    rate: float = parameter(
+        0.0, "simulated seconds per second; 0 = as fast as possible", low=0.0, high=1e6
+    )
+    nodes: tuple[str, ...] = parameter((), "full names of the nodes that must be ready first")
+    sinks: tuple[str, ...] = parameter((), "full names of the nodes whose `done` ends a tick")
+    clock_readers: int = parameter(0, "readers of the clock that must be connected first", low=0)
+    end_when_arrived: bool = parameter(False, "whether to end once every train has arrived")
+    observed: bool = parameter(False, "whether to stay within reach of the report")
+    timeout_s: float = parameter(
+        5.0, "wall time after which a sink is given up", unit="s", low=0.1, high=3600.0
+    )
+    start_timeout_s: float = parameter(
+        60.0, "wall time to wait for the nodes at the start", unit="s", low=0.1, high=3600.0
+    )
+
+
+class WorldNode(CorridorNode):
+    """The world as a node."""
+
+    def __init__(
+        self,
+        *,
+        namespace: str = "",
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(
+            "world", namespace, context=context, parameters=parameters, services=services
+        )
+        self._p = declare(self, WorldParameters)
+        described = read_world_file(self._p.world_file)
+        network = described.network()
+        self._tick_ns = described.tick_ns
+        self._traffic = Traffic(described.trains, network, described.tick_s)
+        self._tick = -1
+        self._begun_s = self._started_s = self._created_s = self.steady_s()
+        self._observed_ns = 0
+        self._missing = {*self._p.nodes, self.get_fully_qualified_name()}
+        self._finished = False
+        names = self._traffic.names
+        self._clock_publisher = self.publisher(topics.CLOCK)
+        self._clock = self._clock_publisher.publish
+        self._state = self.publisher(topics.STATE).publish
+        self._state_table = TableWriter(names, topics.STATE_COLUMNS)
+        self._truth = [self.publisher(topics.TRUTH, train=name).publish for name in names]
+        self._truth_writers: dict[tuple[str, str], PositionWriter] = {}
+        self._finish = self.publisher(topics.FINISHED)
+        self._inbox: TickInbox[None] = TickInbox(self._p.sinks)
+        owners = {sink: sink for sink in self._p.sinks}
+        self._watch = FailureWatch(self, owners, self._drop_sinks)
+        for sink in self._p.sinks:
+            self.stream_in(topics.DONE, lambda raw, sink=sink: self._done(raw, sink), node=sink)
+        if self._p.observed:
+            self.listen(topics.OBSERVED, self._on_observed)
+        self.listen(topics.READY, self._on_ready)
+        self.listen(topics.FAILED, self._on_failed_before_start)
+        self._latched = []
+        for name, track in network.tracks.items():
+            publisher = self.publisher(topics.CORRIDOR_PATH, track=name)
+            publisher.publish(path_of(track))
+            self._latched.append(publisher)
+        publisher = self.publisher(topics.CORRIDOR_MARKERS)
+        publisher.publish(markers(described.radio.stations))
+        self._latched.append(publisher)
+        self._pace: Any = None
+        self._watch_timer = self.every(WATCH_PERIOD_S, self._check)
+        self.announce_when_connected(
+            lambda: self._clock_publisher.get_subscription_count() >= self._p.clock_readers
+        )
+
+    # Before the first tick ---------------------------------------------------------------
+
+    def _on_ready(self, message: Any) -> None:
+        self._missing.discard(message.data)
+        self._start_if_ready()
+
+    def _on_failed_before_start(self, message: Any) -> None:
+        self._missing.discard(message.name)
+        self._start_if_ready()
+
+    def _start_if_ready(self) -> None:
+        if self._tick < 0 and not self._missing:
+            self._started_s = self.steady_s()
+            self._next_tick()
+
+    # Ticks -------------------------------------------------------------------------------
+
+    def _next_tick(self) -> None:
+        if self._finished:
+            return
+        arrived = self._p.end_when_arrived and self._tick >= 0 and self._traffic.all_arrived
+        if arrived or (self._p.ticks and self._tick + 1 >= self._p.ticks):
+            self._end()
+            return
+        self._tick += 1
+        if self._tick > 0:
+            self._traffic.step()
+        stamp_ns = self._tick * self._tick_ns
+        self._begun_s = self.steady_s()
+        state = self._traffic.state()
+        self._state(self._state_table.write(stamp_ns, state))
+        if stamp_ns % NANOSECONDS < self._tick_ns:
+            self._publish_truth(stamp_ns)
+        self._clock(clock_to_cdr(stamp_ns))
+        if not self._p.sinks:
+            self._tick_over()
+
+    def _publish_truth(self, stamp_ns: int) -> None:
+        for publish, (name, track, chainage_m, speed_mps) in zip(
+            self._truth, self._traffic.places(), strict=True
+        ):
+            key = (name, track)
+            if key not in self._truth_writers:
+                self._truth_writers[key] = PositionWriter(name, track)
+            position = Position(stamp_ns, name, track, chainage_m, 0.0, speed_mps, 0.0)
+            publish(self._truth_writers[key].write(position))
+
+    def _done(self, raw: bytes, sink: str) -> None:
+        self._inbox.put(clock_from_cdr(raw), sink, None)
+        while self._inbox.complete:
+            stamp_ns, _ = self._inbox.take()
+            if stamp_ns == self._tick * self._tick_ns:
+                self._tick_over()
+
+    def _tick_over(self) -> None:
+        self._begun_s = float("inf")
+        wait_s = self._wait_s()
+        if wait_s <= 0.0:
+            self._next_tick()
+            return
+        if self._pace is None:
+            self._pace = self.every(wait_s, self._on_pace)
+        else:
+            self._pace.timer_period_ns = int(wait_s * NANOSECONDS)
+            self._pace.reset()
+
+    def _on_pace(self) -> None:
+        self._pace.cancel()
+        if self._wait_s() > 1e-4:
+            self._tick_over()
+        else:
+            self._next_tick()
+
+    def _wait_s(self) -> float:
+        """Wall time until the next tick may start."""
+        wait_s = 0.0
+        if self._p.rate > 0.0:
+            due_s = self._started_s + (self._tick + 1) * self._tick_ns * 1e-9 / self._p.rate
+            wait_s = due_s - self.steady_s()
+        ahead = (self._tick + 1) * self._tick_ns - self._observed_ns
+        if self._p.observed and ahead > OBSERVER_WINDOW_TICKS * self._tick_ns:
+            wait_s = max(wait_s, 0.005)
+        return wait_s
+
+    def _on_observed(self, message: Any) -> None:
+        self._observed_ns = to_ns(message.stamp)
+
+    def _end(self) -> None:
+        self._finished = True
+        self._watch_timer.cancel()
+        header = Header(frame_id="world")
+        header.stamp.sec, header.stamp.nanosec = divmod(self._tick * self._tick_ns, NANOSECONDS)
+        self._finish.publish(header)
+
+    # Failures ----------------------------------------------------------------------------
+
+    def _check(self) -> None:
+        now_s = self.steady_s()
+        if self._tick < 0:
+            if now_s - self._created_s > self._p.start_timeout_s and self._missing:
+                self._watch.name(sorted(self._missing), self._p.start_timeout_s)
+                self._missing.clear()
+                self._start_if_ready()
+            return
+        if now_s - self._begun_s > self._p.timeout_s:
+            # Nothing of the tick may have come, so the inbox cannot tell the stamp by itself.
+            stamp_ns = self._tick * self._tick_ns
+            missing = self._inbox.missing
+            self._watch.give_up(missing, self._p.timeout_s)
+            self.report(
+                DiagnosticStatus.ERROR,
+                "tick",
+                f"no answer from {', '.join(missing)}",
+                stamp_ns=stamp_ns,
+            )
+
+    def _drop_sinks(self, sinks: tuple[str, ...]) -> None:
+        self._inbox.drop(sinks)
+        if self._tick < 0 or self._begun_s == float("inf"):
+            return
+        if self._inbox.complete or not self._inbox.awaits_anything:
+            if self._inbox.stamp_ns is not None:
+                self._inbox.take()
+            self._tick_over()
+
+
+def main() -> None:
+    """Run the world on its own."""
+    run_node(WorldNode)
+
+
+if __name__ == "__main__":
+    main()

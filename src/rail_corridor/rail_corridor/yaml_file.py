@@ -18,7 +18,7 @@ from .errors import InputError
 LARGEST_FILE: Final = 10_000_000
 DEEPEST_NEST: Final = 30
 _LONGEST_KEY: Final = 200
-_LONGEST_NUMBER: Final = 400
+_LONGEST_NUMBER: Final = 4000
 _PARSER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INTEGER: Final = re.compile(r"[-+]?[0-9]+")
 _BASED: Final = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
@@ -94,7 +94,7 @@ def parse_yaml(text: str) -> Any:
 
 def _node(event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Any:
     """Build the data that begins with an event."""
-    line = event.start_mark.line + 1 if event.start_mark else 0
+    line = _line(event)
     if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
         raise InputError(f"anchors and aliases are not allowed, line {line}")
     if depth > DEEPEST_NEST:
@@ -102,7 +102,7 @@ def _node(event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Any:
     if getattr(event, "tag", None) not in (None, "!"):
         raise InputError(f"tags are not allowed, line {line}")
     if isinstance(event, yaml.ScalarEvent):
-        return _scalar(event.value, line) if event.implicit[0] else event.value
+        return _scalar(event.value) if event.implicit[0] else event.value
     if isinstance(event, yaml.SequenceStartEvent):
         items = []
         while not isinstance(event := next(events), yaml.SequenceEndEvent):
@@ -110,6 +110,7 @@ def _node(event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Any:
         return items
     mapping: dict[str, Any] = {}
     while not isinstance(event := next(events), yaml.MappingEndEvent):
+        line = _line(event)
         key = _node(event, events, depth + 1)
         if not isinstance(key, str) or len(key) > _LONGEST_KEY:
             raise InputError(
@@ -123,13 +124,15 @@ def _node(event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Any:
     return mapping
 
 
-def _scalar(text: str, line: int) -> Any:
+def _line(event: yaml.Event) -> int:
+    return event.start_mark.line + 1 if event.start_mark else 0
+
+
+def _scalar(text: str) -> Any:
     """Resolve a plain scalar by the core schema of YAML 1.2."""
     if text in _WORDS:
         return _WORDS[text]
-    if len(text) > _LONGEST_NUMBER:
-        if _INTEGER.fullmatch(text):
-            raise InputError(f"a number of {len(text)} digits, line {line}")
+    if len(text) > _LONGEST_NUMBER:  # more digits than Python converts
         return text
     if _INTEGER.fullmatch(text):
         return int(text)

@@ -17,21 +17,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from rail_signals.line_detector import detection_share
 from rail_signals.line_spectrum import LineSpectrum, line_spectrum
-from rail_signals.offset_search import OffsetSearch, row_dot
+from rail_signals.offset_search import Bursts, OffsetSearch, row_dot
 from rail_signals.ranging_signal import (
     ComplexArray,
     FloatArray,
     RangingSignal,
-    _as_bursts,
 )
 
 MAX_SNR = 1e9
 """Ceiling of the estimated carrier-to-noise ratio (90 dB), where aliased and overlapping
 lines of the order of 1e-9 of the power begin to matter."""
 
+MAX_SNR_SINGLE = 1e6
+"""The same for bursts in single precision (60 dB), where rounding begins to matter."""
+
 _STRONG_SHARE = 0.92
 _DIRECT_PERIOD = 64
-_CHUNK_SAMPLES = 1 << 15
+_CHUNK_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -80,9 +82,10 @@ class LineReceiver:
     2. Fold: the burst is turned back by the offset, about its middle, where the phases of
        carrier and tones do not depend on the offset's error, and its periods are added.
        The transform of the sum holds every line; what is left of the energy is noise.
-    3. Phases: products of neighbouring lines start two Gauss-Newton steps on complex
+    3. Phases: products of neighbouring lines start a Gauss-Newton step on complex
        amplitude and tone phases; the symmetry of the lines makes the normal matrix
-       diagonal.
+       diagonal. A second step would change the error by less than 0.1 % where a burst is
+       detected with a margin of 3 dB.
 
     Parameters
     ----------
@@ -150,9 +153,11 @@ class LineReceiver:
             self._pair_weights[row, tone] = lines.amplitudes[upper] * lines.amplitudes[lower]
         self._turns = 1j * lines.orders.T.astype(np.float64)
         self._power = lines.power
-        self._information = lines.information
+        information = lines.information
+        self._variance = 0.5 / (self.signal.samples * information)
+        self._curvature = information / lines.power
         rows = [lines.amplitudes / lines.power]
-        rows += [lines.orders[:, t] * lines.amplitudes / self._information[t] for t in range(tones)]
+        rows += [lines.orders[:, t] * lines.amplitudes / information[t] for t in range(tones)]
         self._fit = np.stack(rows, axis=-1).astype(np.complex128)
         self._free = len(lines.bins) - 1 - tones / 2
         strong_orders = {tuple(order) for order in strong.orders.tolist()}
@@ -168,17 +173,23 @@ class LineReceiver:
         ----------
         bursts : complex [..., samples]
             Received complex envelopes. Bursts that are zero or not finite count as not
-            detected.
+            detected. Sums over a burst in single precision (complex64) are formed in single
+            precision, twice as fast; all that follows is in double precision.
 
         Returns
         -------
         ToneEstimate
         """
-        x = np.ascontiguousarray(_as_bursts(self.signal, bursts))
+        x = np.asarray(bursts)
+        if x.dtype != np.complex64:
+            x = np.asarray(x, dtype=np.complex128)
+        samples = self.signal.samples
+        if x.ndim == 0 or x.shape[-1] != samples:
+            raise ValueError(f"bursts must have {samples} samples, got shape {x.shape}")
         lead = x.shape[:-1]
-        x = x.reshape(-1, self.signal.samples)
+        x = np.ascontiguousarray(x).reshape(-1, samples)
         # Pieces that stay in the processor's cache.
-        chunk = max(1, _CHUNK_SAMPLES // self.signal.samples)
+        chunk = max(1, _CHUNK_BYTES // (samples * x.itemsize))
         with np.errstate(all="ignore"):
             if len(x) <= chunk:
                 parts = self._estimate(x)
@@ -193,27 +204,29 @@ class LineReceiver:
             *(part.reshape(lead) for part in rest),
         )
 
-    def _estimate(self, x: ComplexArray) -> tuple[NDArray[Any], ...]:
+    def _estimate(self, x: Bursts) -> tuple[NDArray[Any], ...]:
         """Fields of `ToneEstimate` for bursts [batch, samples]."""
         samples, period = self.signal.samples, self._period
-        parts = x.view(np.float64)
+        single = x.dtype == np.complex64
+        parts = x.view(np.float32 if single else np.float64)
         energy = row_dot(parts, parts)
         if self._search:
             offset_hz = self._search.offset_hz(x)
             folded = self._search.fold(x, offset_hz)
         else:
             offset_hz = np.zeros(len(x))
-            folded = (self._ones @ x.reshape(len(x), self._periods, self._period))[:, 0]
+            periods = x.reshape(len(x), self._periods, self._period)
+            folded = np.matmul(self._ones.astype(x.dtype), periods)[:, 0].astype(np.complex128)
         lines = self._lines(folded)
-        phase, amplitude = self._fit_phases(lines)
+        phase, power = self._fit_phases(lines)
 
         parts = folded.view(np.float64)
         # Every line is in the folded period, so the energy outside it is noise.
         outside = energy - row_dot(parts, parts) / self._periods
-        power = amplitude.real**2 + amplitude.imag**2
-        noise = np.maximum(outside / (samples - period), power / MAX_SNR)
+        limit = MAX_SNR_SINGLE if single else MAX_SNR
+        noise = np.maximum(outside / (samples - period), power / limit)
         snr = power / noise
-        variance = (0.5 / samples) / (snr[:, None] * self._information)
+        variance = self._variance / snr[:, None]
         parts = lines.view(np.float64)
         sums = ((parts * parts)[:, None] @ self._sums)[:, 0]
         misfit = (sums[:, 0] - self._power * power) * (samples / self._free) / noise
@@ -222,7 +235,7 @@ class LineReceiver:
         phase %= 2 * math.pi
         phase %= 2 * math.pi
         result = (phase, variance, np.sqrt(power), snr, offset_hz, misfit, detected)
-        if not detected.all():
+        if np.count_nonzero(detected) < len(x):
             for field, value in zip(result, _MISSED, strict=False):
                 field[~detected] = value
         return result
@@ -238,17 +251,19 @@ class LineReceiver:
         lines *= 1 / self._periods
         return lines
 
-    def _fit_phases(self, lines: ComplexArray) -> tuple[FloatArray, ComplexArray]:
-        """Tone phases [batch, tones] and complex amplitude [batch] by Gauss-Newton."""
+    def _fit_phases(self, lines: ComplexArray) -> tuple[FloatArray, FloatArray]:
+        """Tone phases [batch, tones] and carrier power [batch] by a Gauss-Newton step."""
         products = lines.conj().take(self._upper, axis=1)
         products *= lines.take(self._lower, axis=1)
         start = products[:, None] @ self._pair_weights
         phase = np.arctan2(start.imag, start.real)
-        column = lines[:, None]
-        for _ in range(2):
-            fit = (column * np.exp(phase @ self._turns)) @ self._fit
-            phase -= (fit[..., 1:] / fit[..., :1]).imag
-        return phase[:, 0], fit[:, 0, 0]
+        fit = (lines[:, None] * np.exp(phase @ self._turns)) @ self._fit
+        step = (fit[..., 1:] / fit[..., :1]).imag
+        phase -= step
+        amplitude = np.abs(fit[:, 0, 0])
+        # The step adds to what the fit explains, to second order.
+        gain = 1 + row_dot(step * step, self._curvature)[:, 0]
+        return phase[:, 0], amplitude * amplitude * gain
 
 
 _MISSED = (np.nan, np.inf, 0.0, 0.0, np.nan, np.nan)

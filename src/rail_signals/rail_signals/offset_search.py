@@ -8,11 +8,15 @@ and in power over the lines, peak.
 from __future__ import annotations
 
 import math
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rail_signals.line_spectrum import LineSpectrum
 from rail_signals.ranging_signal import ComplexArray, FloatArray, RangingSignal
+
+Bursts: TypeAlias = NDArray[np.complex64] | NDArray[np.complex128]
 
 _SEGMENT_CYCLES = 0.25
 
@@ -54,13 +58,19 @@ class OffsetSearch:
         segments = periods // repeats
         self._shape = (segments, 2 * repeats * period)
         # Each segment is one row of samples, so the basis repeats with the period.
-        self._basis = np.tile(lines.real_basis(period), (repeats, 1))
+        # Real before imaginary parts, so that products with `_grid` stay real.
+        basis = lines.real_basis(period).reshape(2 * period, -1, 2).swapaxes(1, 2)
+        self._basis = np.tile(basis.reshape(2 * period, -1), (repeats, 1))
+        self._single_basis = self._basis.astype(np.float32)
         step_hz = 0.5 / signal.duration_s
         half = math.ceil(max_offset_hz / step_hz) + 1
         self._grid_hz = step_hz * np.arange(-half, half + 1)
         centre_s = (np.arange(segments) - (segments - 1) / 2) * repeats * period / rate_hz
         turn = 2 * math.pi * self._grid_hz[:, None] * centre_s
-        self._grid = np.concatenate([np.cos(turn), np.sin(turn)])
+        cos, sin = np.cos(turn), np.sin(turn)
+        grid = np.stack([np.stack([cos, sin], axis=-1), np.stack([-sin, cos], axis=-1)], axis=1)
+        self._grid = grid.reshape(2 * len(turn), 2 * segments)
+        self._line_count = len(lines.bins)
         self._arc = math.tan(math.pi / (2 * segments))
         self._arc_hz = segments / math.pi / signal.duration_s
         # The time of a sample about the middle is a sum of four terms, so its phasor is
@@ -82,22 +92,24 @@ class OffsetSearch:
         """Width of the interval searched [Hz]."""
         return float(self._grid_hz[-1] - self._grid_hz[0])
 
-    def offset_hz(self, bursts: ComplexArray) -> FloatArray:
+    def offset_hz(self, bursts: Bursts) -> FloatArray:
         """Carrier offset [Hz] of each of `bursts` [batch, samples]."""
         # Matrix products are stacked, one of fixed shape for each burst, so that their
         # rounding does not depend on the batch.
-        rows = bursts.view(np.float64).reshape(-1, *self._shape)
-        both = (self._grid @ (rows @ self._basis)).view(np.complex128)
-        count = len(self._grid_hz)
-        response = (both[:, :count] - 1j * both[:, count:]).view(np.float64)
+        single = bursts.dtype == np.complex64
+        rows = bursts.view(np.float32 if single else np.float64).reshape(len(bursts), *self._shape)
+        lines = rows @ (self._single_basis if single else self._basis)
+        count = self._line_count
+        response = self._grid @ lines.reshape(len(rows), 2 * self._shape[0], count)
+        response = response.reshape(len(rows), len(self._grid_hz), 2 * count)
         peak = row_dot(response, response)[:, 1:-1].argmax(axis=-1) + 1
-        row = np.arange(len(peak))
+        row = np.arange(len(rows))
         above, below = response[row, peak + 1], response[row, peak - 1]
         total = above + below
         quotient = row_dot(above - below, total) / row_dot(total, total)
         return np.asarray(self._grid_hz[peak] + np.arctan(quotient * self._arc) * self._arc_hz)
 
-    def fold(self, bursts: ComplexArray, offset_hz: FloatArray) -> ComplexArray:
+    def fold(self, bursts: Bursts, offset_hz: FloatArray) -> ComplexArray:
         """Sum of the periods [batch, period] after turning back by `offset_hz` [batch].
 
         The phase is turned about the middle of the burst.
@@ -106,14 +118,15 @@ class OffsetSearch:
         table = np.exp(offset_hz[:, None] * self._ramp)
         i, j, k = self._split
         turn = (table[:, :i, None] * table[:, None, i:j]).reshape(batch, 1, self._periods)
+        turn = turn.astype(bursts.dtype, copy=False)
         within = (table[:, j:k, None] * table[:, None, k:]).reshape(batch, self._period)
         within *= (turn @ bursts.reshape(batch, self._periods, self._period))[:, 0]
         return within
 
 
-def row_dot(left: FloatArray, right: FloatArray) -> FloatArray:
+def row_dot(left: NDArray[Any], right: NDArray[Any]) -> FloatArray:
     """Inner product along the last axis."""
-    return np.asarray(np.vecdot(left, right))
+    return np.asarray(np.vecdot(left, right), dtype=np.float64)
 
 
 def _segment_periods(periods: int, cycles_per_period: float) -> int:

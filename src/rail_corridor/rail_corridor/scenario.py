@@ -163,6 +163,8 @@ def scenario_from_data(data: Mapping[str, Any], *, directory: Path) -> Scenario:
         raise from_validation(error, data, _field_names()) from None
     except RecursionError:
         raise InputError("is nested too deeply") from None
+    except OverflowError:
+        raise InputError("holds a number beyond all bounds") from None
     if not scenario.tracks:
         raise InputError(
             "at least one track is needed; describe one, or give a line with --track FILE.json",

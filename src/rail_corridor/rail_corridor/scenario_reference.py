@@ -8,6 +8,8 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
+from rail_world.description import Davis, VehicleDescription
+
 from .scenario import Scenario, models_of
 
 
@@ -17,7 +19,7 @@ def field_tables() -> str:
 
 
 def _table(model: type[BaseModel]) -> str:
-    summary = (model.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
+    summary = (model.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ").replace("``", "`")
     rows = [
         f"### {model.__name__}",
         "",
@@ -27,27 +29,29 @@ def _table(model: type[BaseModel]) -> str:
         "|---|---|---|",
     ]
     for name, field in model.model_fields.items():
-        meaning = field.description or ""
+        meaning = field.description or "which kind it is"
         if bounds := _bounds(field.metadata):
             meaning += f"; {bounds}"
-        rows.append(f"| `{name}` | {_default(field)} | {meaning} |")
+        rows.append(f"| `{name}` | {_default(model, field)} | {meaning} |")
     return "\n".join(rows)
 
 
-def _default(field: Any) -> str:
+def _default(model: type[BaseModel], field: Any) -> str:
     if field.default_factory is not None:
-        return "the section's"
+        return "its defaults"
     if field.default is PydanticUndefined:
-        return "needed"
+        return "the preset's" if model in (VehicleDescription, Davis) else "needed"
     if isinstance(field.default, BaseModel):
-        return "the section's"
+        return "its defaults"
     if field.default is None:
         return "null"
     if field.default is True or field.default is False:
         return str(field.default).lower()
+    if field.default == "":
+        return "empty"
     if isinstance(field.default, tuple):
         return re.sub(r",\]", "]", str(field.default).replace("(", "[").replace(")", "]"))
-    return f"{field.default:g}" if isinstance(field.default, float) else str(field.default)
+    return f"{field.default:.12g}" if isinstance(field.default, float) else str(field.default)
 
 
 def _bounds(metadata: list[Any]) -> str:
@@ -55,5 +59,5 @@ def _bounds(metadata: list[Any]) -> str:
     for item in metadata:
         for key, text in (("gt", "above"), ("ge", "from"), ("lt", "below"), ("le", "to")):
             if (value := getattr(item, key, None)) is not None:
-                parts.append(f"{text} {value:g}")
+                parts.append(f"{text} {value:.12g}")
     return " ".join(parts)

@@ -18,7 +18,7 @@ from .errors import InputError
 LARGEST_FILE: Final = 10_000_000
 DEEPEST_NEST: Final = 30
 _LONGEST_KEY: Final = 200
-_LONGEST_NUMBER: Final = 4000
+_LONGEST_NUMBER: Final = 300
 _PARSER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INTEGER: Final = re.compile(r"[-+]?[0-9]+")
 _BASED: Final = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
@@ -132,7 +132,7 @@ def _scalar(text: str) -> Any:
     """Resolve a plain scalar by the core schema of YAML 1.2."""
     if text in _WORDS:
         return _WORDS[text]
-    if len(text) > _LONGEST_NUMBER:  # more digits than Python converts
+    if len(text) > _LONGEST_NUMBER:  # beyond any float; the model says which field it is
         return text
     if _INTEGER.fullmatch(text):
         return int(text)

@@ -17,12 +17,11 @@ import sys
 import time
 
 import numpy as np
-from gnuradio import analog, blocks, filter as gr_filter, gr
+from gnuradio import analog, blocks, gr
+from gnuradio import filter as gr_filter
 
 
-def flowgraph(
-    bursts: np.ndarray, taps: np.ndarray
-) -> tuple[gr.top_block, blocks.vector_sink_f]:
+def flowgraph(bursts: np.ndarray, taps: np.ndarray) -> tuple[gr.top_block, blocks.vector_sink_f]:
     """Source, discriminator, correlator and phase; one output for each burst."""
     top = gr.top_block()
     samples = bursts.shape[1]

@@ -33,7 +33,7 @@ MAX_SNR_SINGLE = 1e6
 
 _STRONG_SHARE = 0.92
 _DIRECT_PERIOD = 64
-_CHUNK_BYTES = 1 << 20
+_CHUNK_BYTES = 3 << 18
 
 
 @dataclass(frozen=True)
@@ -192,11 +192,14 @@ class LineReceiver:
         chunk = max(1, _CHUNK_BYTES // (samples * x.itemsize))
         with np.errstate(all="ignore"):
             if len(x) <= chunk:
-                parts = self._estimate(x)
+                energy, offset_hz, folded = self._sum_bursts(x)
             else:
-                pieces = [self._estimate(x[i : i + chunk]) for i in range(0, len(x), chunk)]
-                parts = tuple(np.concatenate(column) for column in zip(*pieces, strict=True))
-        phase, variance, *rest = parts
+                pieces = [self._sum_bursts(x[i : i + chunk]) for i in range(0, len(x), chunk)]
+                energy, offset_hz, folded = (
+                    np.concatenate(column) for column in zip(*pieces, strict=True)
+                )
+            max_snr = MAX_SNR_SINGLE if x.dtype == np.complex64 else MAX_SNR
+            phase, variance, *rest = self._evaluate(energy, offset_hz, folded, max_snr)
         tones = len(self.signal.tones_hz)
         return ToneEstimate(
             phase.reshape(*lead, tones),
@@ -204,27 +207,29 @@ class LineReceiver:
             *(part.reshape(lead) for part in rest),
         )
 
-    def _estimate(self, x: Bursts) -> tuple[NDArray[Any], ...]:
-        """Fields of `ToneEstimate` for bursts [batch, samples]."""
-        samples, period = self.signal.samples, self._period
-        single = x.dtype == np.complex64
-        parts = x.view(np.float32 if single else np.float64)
+    def _sum_bursts(self, x: Bursts) -> tuple[Any, ...]:
+        """Energy, carrier offset [batch] and folded period [batch, period] of bursts."""
+        parts = x.view(np.float32 if x.dtype == np.complex64 else np.float64)
         energy = row_dot(parts, parts)
         if self._search:
             offset_hz = self._search.offset_hz(x)
-            folded = self._search.fold(x, offset_hz)
-        else:
-            offset_hz = np.zeros(len(x))
-            periods = x.reshape(len(x), self._periods, self._period)
-            folded = np.matmul(self._ones.astype(x.dtype), periods)[:, 0].astype(np.complex128)
+            return energy, offset_hz, self._search.fold(x, offset_hz)
+        periods = x.reshape(len(x), self._periods, self._period)
+        folded = np.matmul(self._ones.astype(x.dtype), periods)[:, 0]
+        return energy, np.zeros(len(x)), folded.astype(np.complex128)
+
+    def _evaluate(
+        self, energy: FloatArray, offset_hz: FloatArray, folded: ComplexArray, max_snr: float
+    ) -> tuple[NDArray[Any], ...]:
+        """Fields of `ToneEstimate` from what `_sum_bursts` returns."""
+        samples, period = self.signal.samples, self._period
         lines = self._lines(folded)
         phase, power = self._fit_phases(lines)
 
         parts = folded.view(np.float64)
         # Every line is in the folded period, so the energy outside it is noise.
         outside = energy - row_dot(parts, parts) / self._periods
-        limit = MAX_SNR_SINGLE if single else MAX_SNR
-        noise = np.maximum(outside / (samples - period), power / limit)
+        noise = np.maximum(outside / (samples - period), power / max_snr)
         snr = power / noise
         variance = self._variance / snr[:, None]
         parts = lines.view(np.float64)
@@ -235,7 +240,7 @@ class LineReceiver:
         phase %= 2 * math.pi
         phase %= 2 * math.pi
         result = (phase, variance, np.sqrt(power), snr, offset_hz, misfit, detected)
-        if np.count_nonzero(detected) < len(x):
+        if np.count_nonzero(detected) < len(detected):
             for field, value in zip(result, _MISSED, strict=False):
                 field[~detected] = value
         return result

@@ -19,6 +19,7 @@ from rail_signals.ranging_signal import ComplexArray, FloatArray, RangingSignal
 Bursts: TypeAlias = NDArray[np.complex64] | NDArray[np.complex128]
 
 _SEGMENT_CYCLES = 0.25
+_FOLD_FROM = 12
 
 
 class OffsetSearch:
@@ -56,11 +57,14 @@ class OffsetSearch:
         periods = signal.samples // period
         repeats = _segment_periods(periods, max_offset_hz * period / rate_hz)
         segments = periods // repeats
-        self._shape = (segments, 2 * repeats * period)
-        # Each segment is one row of samples, so the basis repeats with the period.
+        # Long segments are folded first. Of short ones each is one row of samples, and the
+        # basis repeats with the period: one product instead of many small ones.
+        long = repeats >= _FOLD_FROM
+        self._ones = np.ones((1, repeats)) if long else None
+        self._shape = (segments, repeats, 2 * period) if long else (segments, 2 * repeats * period)
         # Real before imaginary parts, so that products with `_grid` stay real.
         basis = lines.real_basis(period).reshape(2 * period, -1, 2).swapaxes(1, 2)
-        self._basis = np.tile(basis.reshape(2 * period, -1), (repeats, 1))
+        self._basis = np.tile(basis.reshape(2 * period, -1), (1 if long else repeats, 1))
         self._single_basis = self._basis.astype(np.float32)
         step_hz = 0.5 / signal.duration_s
         half = math.ceil(max_offset_hz / step_hz) + 1
@@ -98,6 +102,8 @@ class OffsetSearch:
         # rounding does not depend on the batch.
         single = bursts.dtype == np.complex64
         rows = bursts.view(np.float32 if single else np.float64).reshape(len(bursts), *self._shape)
+        if self._ones is not None:
+            rows = np.matmul(self._ones.astype(rows.dtype), rows)[:, :, 0]
         lines = rows @ (self._single_basis if single else self._basis)
         count = self._line_count
         response = self._grid @ lines.reshape(len(rows), 2 * self._shape[0], count)

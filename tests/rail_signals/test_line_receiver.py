@@ -122,22 +122,39 @@ def same_bits(left: ToneEstimate, right: ToneEstimate, i: int, j: int) -> None:
 
 
 @pytest.mark.parametrize("signal", [ONE, TWO, RangingSignal(samples=3968)])
-@pytest.mark.parametrize("max_offset_hz", [0.0, 5e3])
-def test_result_does_not_depend_on_the_batch(signal: RangingSignal, max_offset_hz: float) -> None:
+@pytest.mark.parametrize("max_offset_hz", [0.0, 1e3, 5e3])
+@pytest.mark.parametrize("precision", [np.complex64, np.complex128])
+def test_result_does_not_depend_on_the_batch(
+    signal: RangingSignal, max_offset_hz: float, precision: type
+) -> None:
     rng = np.random.default_rng(33)
     receiver = LineReceiver(signal, max_offset_hz=max_offset_hz)
     bursts = modulate(signal, rng.uniform(0, 6, (50, len(signal.tones_hz))))
-    bursts = bursts + noise(rng, bursts.shape, db=-3.0)
+    bursts = (bursts + noise(rng, bursts.shape, db=-3.0)).astype(precision)
     whole = receiver.estimate(bursts)
     strided = receiver.estimate(np.repeat(bursts, 2, axis=0)[::2])
     for i in range(50):
         single = receiver.estimate(bursts[i : i + 1])
         # A copy at another address: alignment must not matter either.
-        shifted = np.empty(signal.samples + 1, dtype=np.complex128)[1:]
+        shifted = np.empty(signal.samples + 1, dtype=precision)[1:]
         shifted[:] = bursts[i]
         same_bits(whole, single, i, 0)
         same_bits(whole, receiver.estimate(shifted[None]), i, 0)
         same_bits(whole, strided, i, i)
+
+
+def test_single_precision_is_good_to_60_db() -> None:
+    rng = np.random.default_rng(36)
+    signal = RangingSignal(samples=3968)
+    receiver = LineReceiver(signal)
+    lag = rng.uniform(0, 2 * math.pi, (1000, 1))
+    bursts = modulate(signal, lag)
+    bursts *= np.exp(2j * math.pi * 4321.0 / 4e6 * np.arange(signal.samples))
+    bursts += noise(rng, bursts.shape, db=55.0)
+    found = receiver.estimate(bursts.astype(np.complex64))
+    error = np.angle(np.exp(1j * (found.phase_lag_rad - lag)))
+    assert np.sqrt(np.mean(error**2) * 10**5.5 * 3968) == pytest.approx(1.0, abs=0.05)
+    assert found.snr.mean() == pytest.approx(10**5.5, rel=0.1)
 
 
 def test_two_signals_show_in_the_misfit() -> None:

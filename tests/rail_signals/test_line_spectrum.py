@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import beta as beta_law
 
@@ -15,6 +15,7 @@ from rail_signals.line_spectrum import LOST_INFORMATION, line_spectrum
 from rail_signals.ranging_signal import RangingSignal, modulate
 
 
+@settings(max_examples=25)
 @given(st.floats(0.05, 1.2), st.floats(0.05, 0.9))
 def test_lines_are_the_transform_of_the_wave(high: float, low: float) -> None:
     signal = RangingSignal(

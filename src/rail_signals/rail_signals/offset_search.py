@@ -65,7 +65,6 @@ class OffsetSearch:
         # Real before imaginary parts, so that products with `_grid` stay real.
         basis = lines.real_basis(period).reshape(2 * period, -1, 2).swapaxes(1, 2)
         self._basis = np.tile(basis.reshape(2 * period, -1), (1 if long else repeats, 1))
-        self._single_basis = self._basis.astype(np.float32)
         step_hz = 0.5 / signal.duration_s
         half = math.ceil(max_offset_hz / step_hz) + 1
         self._grid_hz = step_hz * np.arange(-half, half + 1)
@@ -74,6 +73,7 @@ class OffsetSearch:
         cos, sin = np.cos(turn), np.sin(turn)
         grid = np.stack([np.stack([cos, sin], axis=-1), np.stack([-sin, cos], axis=-1)], axis=1)
         self._grid = grid.reshape(2 * len(turn), 2 * segments)
+        self._single = (self._basis.astype(np.float32), self._grid.astype(np.float32))
         self._line_count = len(lines.bins)
         self._arc = math.tan(math.pi / (2 * segments))
         self._arc_hz = segments / math.pi / signal.duration_s
@@ -87,7 +87,7 @@ class OffsetSearch:
             (fine, 1),
         )
         times = [(np.arange(count) - (count - 1) / 2) * step / rate_hz for count, step in steps]
-        self._ramp = -2j * math.pi * np.concatenate(times)
+        self._ramp = -2 * math.pi * np.concatenate(times)
         self._split = np.cumsum([count for count, _ in steps])[:3].tolist()
         self._periods, self._period = periods, period
 
@@ -101,12 +101,13 @@ class OffsetSearch:
         # Matrix products are stacked, one of fixed shape for each burst, so that their
         # rounding does not depend on the batch.
         single = bursts.dtype == np.complex64
-        rows = bursts.view(np.float32 if single else np.float64).reshape(len(bursts), *self._shape)
+        basis, grid = self._single if single else (self._basis, self._grid)
+        rows = bursts.view(basis.dtype).reshape(len(bursts), *self._shape)
         if self._ones is not None:
             rows = np.matmul(self._ones.astype(rows.dtype), rows)[:, :, 0]
-        lines = rows @ (self._single_basis if single else self._basis)
+        lines = rows @ basis
         count = self._line_count
-        response = self._grid @ lines.reshape(len(rows), 2 * self._shape[0], count)
+        response = grid @ lines.reshape(len(rows), 2 * self._shape[0], count)
         response = response.reshape(len(rows), len(self._grid_hz), 2 * count)
         peak = row_dot(response, response)[:, 1:-1].argmax(axis=-1) + 1
         row = np.arange(len(rows))
@@ -121,13 +122,15 @@ class OffsetSearch:
         The phase is turned about the middle of the burst.
         """
         batch = len(bursts)
-        table = np.exp(offset_hz[:, None] * self._ramp)
+        table = np.empty((batch, len(self._ramp)), dtype=bursts.dtype)
+        angle = (offset_hz[:, None] * self._ramp).astype(table.real.dtype, copy=False)
+        np.cos(angle, out=table.real)
+        np.sin(angle, out=table.imag)
         i, j, k = self._split
         turn = (table[:, :i, None] * table[:, None, i:j]).reshape(batch, 1, self._periods)
-        turn = turn.astype(bursts.dtype, copy=False)
         within = (table[:, j:k, None] * table[:, None, k:]).reshape(batch, self._period)
         within *= (turn @ bursts.reshape(batch, self._periods, self._period))[:, 0]
-        return within
+        return within.astype(np.complex128, copy=False)
 
 
 def row_dot(left: NDArray[Any], right: NDArray[Any]) -> FloatArray:

@@ -12,7 +12,9 @@ four; any ROS 2 tool reads it.
 from __future__ import annotations
 
 import array
+import math
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -29,6 +31,7 @@ LABELS: Final = ("antenna", "sample", "iq")
 # CDR of the layout above: three labelled dimensions, the data offset, the element count.
 _PREFIX = struct.Struct("<4sI I8sII I7sxII I3sxII II4x")
 _HEADER = struct.Struct("<4d")
+_STAMP = struct.Struct("<d")
 _DATA_AT = _PREFIX.size + _HEADER.size
 
 
@@ -121,15 +124,15 @@ class Waveform:
         data = np.frombuffer(message.data, dtype=np.float64)
         if parts != 2 or data.size != HEADER_VALUES + 2 * antennas * count:
             raise ValueError(f"not a waveform: {data.size} values for {antennas} x {count} samples")
-        stamp_s, sample_rate_hz, carrier_hz, channel = data[:HEADER_VALUES]
-        samples = data[HEADER_VALUES:].view(np.complex128).reshape(antennas, count)
-        return cls(
-            seconds_to_ns(float(stamp_s)),
-            float(sample_rate_hz),
-            float(carrier_hz),
-            int(channel),
-            samples,
-        )
+        samples = data[HEADER_VALUES:].view(np.complex128)
+        return cls._of(data[:HEADER_VALUES].tolist(), samples.reshape(antennas, count))
+
+    @classmethod
+    def _of(cls, header: Sequence[float], samples: NDArray[np.complex128]) -> Waveform:
+        stamp_s, sample_rate_hz, carrier_hz, channel = header
+        if not (math.isfinite(stamp_s) and math.isfinite(channel)):
+            raise ValueError(f"not a waveform: stamp {stamp_s} s, channel {channel}")
+        return cls(seconds_to_ns(stamp_s), sample_rate_hz, carrier_hz, int(channel), samples)
 
     @classmethod
     def from_cdr(cls, raw: bytes) -> Waveform:
@@ -140,24 +143,22 @@ class Waveform:
         ValueError
             If the layout is not that of a waveform.
         """
-        if len(raw) < _DATA_AT or raw[:8] != _MAGIC or raw[12:20] != b"antenna\0":
+        if len(raw) < _DATA_AT:
             return cls.from_msg(deserialize_message(raw, Float64MultiArray))
         fields = _PREFIX.unpack_from(raw)
         antennas, count = fields[4], fields[8]
-        if fields[15] != HEADER_VALUES + 2 * antennas * count:
+        if (
+            fields[15] != HEADER_VALUES + 2 * antennas * count
+            or (*fields[:4], *fields[6:8], *fields[10:13], fields[14]) != _LAYOUT
+        ):
             return cls.from_msg(deserialize_message(raw, Float64MultiArray))
-        stamp_s, sample_rate_hz, carrier_hz, channel = _HEADER.unpack_from(raw, _PREFIX.size)
         samples = np.frombuffer(raw, np.complex128, antennas * count, _DATA_AT)
-        return cls(
-            seconds_to_ns(stamp_s),
-            sample_rate_hz,
-            carrier_hz,
-            int(channel),
-            samples.reshape(antennas, count),
-        )
+        header = _HEADER.unpack_from(raw, _PREFIX.size)
+        return cls._of(header, samples.reshape(antennas, count))
 
 
-_MAGIC = CDR_LITTLE_ENDIAN + b"\x03\x00\x00\x00"
+# What of the prefix is the same for every waveform.
+_LAYOUT = (CDR_LITTLE_ENDIAN, 3, 8, b"antenna\0", 7, b"sample\0", 3, b"iq\0", 2, HEADER_VALUES)
 
 
 def _sample_bytes(samples: NDArray[np.complex128]) -> bytes:
@@ -171,6 +172,16 @@ def silence(stamp_ns: int, sample_rate_hz: float, carrier_hz: float, channel: in
     )
 
 
+def silent_stamp_ns(raw: bytes) -> int | None:
+    """Stamp of a serialised block without samples, None for one with samples.
+
+    Most blocks of a long line are silent; this tells them by their length alone.
+    """
+    if len(raw) != _DATA_AT:
+        return None
+    return seconds_to_ns(_STAMP.unpack_from(raw, _PREFIX.size)[0])
+
+
 class RepeatedBlock:
     """A block that a transmitter sends again every tick with nothing new but its stamp."""
 
@@ -181,4 +192,4 @@ class RepeatedBlock:
 
     def at(self, stamp_ns: int) -> bytes:
         """Serialised block of the tick at ``stamp_ns``."""
-        return b"".join((self._before, struct.pack("<d", stamp_ns / NANOSECONDS), self._after))
+        return b"".join((self._before, _STAMP.pack(stamp_ns / NANOSECONDS), self._after))

@@ -33,7 +33,7 @@ MAX_SNR_SINGLE = 1e6
 
 _STRONG_SHARE = 0.92
 _DIRECT_PERIOD = 64
-_CHUNK_BYTES = 1 << 20
+_CHUNK_BYTES = 3 << 19
 
 
 @dataclass(frozen=True)

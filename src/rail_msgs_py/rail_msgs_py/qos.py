@@ -35,7 +35,8 @@ ESTIMATE: Final = QoSProfile(
 #: State that late joiners must learn: the last messages of each publisher are kept for them.
 LATCHED: Final = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
-    depth=100,
+    # More than nodes can announce at once: the reader of /ready must not lose one of them.
+    depth=2000,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )

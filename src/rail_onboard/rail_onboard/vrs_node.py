@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from rail_msgs_py import topics
 from rail_msgs_py.inbox import TickInbox
@@ -18,9 +19,10 @@ from rail_msgs_py.parameters import ParameterError, declare, parameter
 from rail_msgs_py.signal_parameters import SignalParameters, signal_of
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
-from rail_msgs_py.waveform import Waveform, silence
+from rail_msgs_py.waveform import Waveform, silence, silent_stamp_ns
 from rail_signals.line_receiver import LineReceiver, ToneEstimate
-from rail_signals.transponder import transpond
+from rail_signals.ranging_signal import modulate
+from rail_signals.transponder import reply_lag_rad
 
 from rail_onboard.channel_selector import ChannelSelector
 
@@ -74,7 +76,7 @@ class VrsNode(Equipment):
         self._amplitude = 10.0 ** (self._p.power_dbm / 20.0)
         self._delay_s = self._p.transponder_delay_s + self._p.delay_trim_s
         train = namespace.strip("/")
-        self._inbox: TickInbox[Waveform] = TickInbox(str(channel) for channel in channels)
+        self._inbox: TickInbox[NDArray[np.complex128] | None] = TickInbox(str(channel) for channel in channels)
         for channel in channels:
             self.stream_in(
                 topics.VRS_RX,
@@ -90,39 +92,46 @@ class VrsNode(Equipment):
         self.announce_when_connected()
 
     def _receive(self, channel: int, raw: bytes) -> None:
-        block = Waveform.from_cdr(raw)
-        self._inbox.put(block.stamp_ns, str(channel), block)
+        stamp_ns = silent_stamp_ns(raw)
+        if stamp_ns is not None:
+            self._inbox.put(stamp_ns, str(channel), None)
+        else:
+            block = Waveform.from_cdr(raw)
+            self._inbox.put(block.stamp_ns, str(channel), block.samples[0])
         if self._inbox.complete:
-            stamp_ns, blocks = self._inbox.take()
-            self._answer(stamp_ns, {block.channel: block for block in blocks.values()})
+            stamp_ns, bursts = self._inbox.take()
+            heard = {int(port): burst for port, burst in bursts.items() if burst is not None}
+            self._answer(stamp_ns, dict(sorted(heard.items())))
 
-    def _answer(self, stamp_ns: int, blocks: Mapping[int, Waveform]) -> None:
-        heard: dict[int, ToneEstimate] = {}
-        if self.switched_on:
-            for channel, block in blocks.items():
-                if not block.silent:
-                    estimate = self._receiver.estimate(block.samples[0])
-                    if estimate.detected:
-                        heard[channel] = estimate
-        levels = {
-            channel: 20.0 * float(np.log10(estimate.amplitude))
-            for channel, estimate in heard.items()
-        }
+    def _answer(self, stamp_ns: int, bursts: dict[int, NDArray[np.complex128]]) -> None:
+        levels: dict[int, float] = {}
+        rows = {channel: row for row, channel in enumerate(bursts)}
+        estimates: ToneEstimate | None = None
+        if self.switched_on and bursts:
+            estimates = self._receiver.estimate(np.stack(list(bursts.values())))
+            with np.errstate(divide="ignore"):
+                dbm = 20.0 * np.log10(estimates.amplitude)
+            levels = {c: float(dbm[row]) for c, row in rows.items() if estimates.detected[row]}
         downlink = self._selector.update(levels)
-        self._send(self._reply(stamp_ns, heard.get(downlink) if downlink is not None else None))
+        if estimates is None or downlink not in levels:
+            self._send(self._silence(stamp_ns))
+        else:
+            self._send(self._reply(stamp_ns, estimates, rows[downlink]))
         self._publish_channel(stamp_ns, levels)
-        self._report(stamp_ns, downlink in heard, any(not b.silent for b in blocks.values()))
+        self._report(stamp_ns, downlink in levels, bool(bursts))
 
-    def _reply(self, stamp_ns: int, estimate: ToneEstimate | None) -> bytes:
+    def _reply(self, stamp_ns: int, estimates: ToneEstimate, row: int) -> bytes:
         uplink = self._selector.uplink
-        if uplink is None:
-            uplink = self._p.uplink_channels[0]
-            estimate = None
+        assert uplink is not None
+        lag_rad = reply_lag_rad(estimates.phase_lag_rad[row], self._signal, self._delay_s)
+        samples = modulate(self._signal, lag_rad) * self._amplitude
         radio = (self._signal.sample_rate_hz, self._carriers_hz[uplink], uplink)
-        if estimate is None:
-            return silence(stamp_ns, *radio).to_cdr()
-        samples = transpond(estimate, self._signal, self._delay_s) * self._amplitude
         return Waveform(stamp_ns, *radio, samples[None, :]).to_cdr()
+
+    def _silence(self, stamp_ns: int) -> bytes:
+        uplink = self._selector.uplink or self._p.uplink_channels[0]
+        radio = (self._signal.sample_rate_hz, self._carriers_hz[uplink], uplink)
+        return silence(stamp_ns, *radio).to_cdr()
 
     def _publish_channel(self, stamp_ns: int, levels: Mapping[int, float]) -> None:
         self._figures[0, 0] = self._selector.downlink or 0

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rail_signals.line_receiver import ToneEstimate
 from rail_signals.phase_range import range_per_radian_m
-from rail_signals.ranging_signal import ComplexArray, RangingSignal, modulate
+from rail_signals.ranging_signal import ComplexArray, FloatArray, RangingSignal, modulate
 
 
 def transpond(estimate: ToneEstimate, signal: RangingSignal, delay_s: ArrayLike) -> ComplexArray:
@@ -35,13 +35,31 @@ def transpond(estimate: ToneEstimate, signal: RangingSignal, delay_s: ArrayLike)
     complex128 [..., samples]
         Reply of unit amplitude; silence (zeros) where nothing was detected.
     """
-    delay = np.asarray(delay_s, dtype=np.float64)[..., None]
-    lag = estimate.phase_lag_rad + 2 * math.pi * delay * np.asarray(signal.tones_hz)
+    lag = reply_lag_rad(estimate.phase_lag_rad, signal, delay_s)
     detected = np.asarray(estimate.detected, dtype=np.bool_)
     reply = modulate(signal, np.where(detected[..., None], lag, 0.0))
     if not detected.all():
         reply[~np.broadcast_to(detected, reply.shape[:-1])] = 0.0
     return reply
+
+
+def reply_lag_rad(
+    phase_lag_rad: ArrayLike, signal: RangingSignal, delay_s: ArrayLike
+) -> FloatArray:
+    """Tone lags [..., tones] of the reply: those received, and the delay's share of them.
+
+    Parameters
+    ----------
+    phase_lag_rad : [..., tones]
+        Lags of the tones received [rad].
+    signal
+        Tones of the reply.
+    delay_s : [...]
+        Processing delay [s]; broadcasts against the leading axes.
+    """
+    delay = np.asarray(delay_s, dtype=np.float64)[..., None]
+    lag = np.asarray(phase_lag_rad, dtype=np.float64)
+    return np.asarray(lag + 2 * math.pi * delay * np.asarray(signal.tones_hz))
 
 
 def calibrate_delay(

@@ -18,7 +18,7 @@ from rail_msgs_py.range_reading import RangeWriter
 from rail_msgs_py.signal_parameters import SignalParameters, signal_of
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.standalone import run_node
-from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
+from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence, silent_stamp_ns
 from rail_signals.ranging_signal import modulate
 
 from rail_wayside.ranging_station import NOTHING_HEARD, RangingStation
@@ -53,6 +53,7 @@ class _Antenna:
     send: Callable[[bytes], None]
     publish: Callable[[bytes], None]
     writer: RangeWriter
+    disturbance: str = ""
 
 
 class WrsNode(Equipment):
@@ -128,22 +129,26 @@ class WrsNode(Equipment):
             antenna.send(block.at(stamp_ns))
 
     def _receive(self, zone: str, antenna: _Antenna, raw: bytes) -> None:
-        block = Waveform.from_cdr(raw)
-        if block.silent or not self.switched_on:
+        stamp_ns = silent_stamp_ns(raw)
+        if stamp_ns is not None:
             reading = NOTHING_HEARD
         else:
-            reading = self._station.read(block.samples[0])
-        antenna.publish(antenna.writer.write(block.stamp_ns, reading.range_m, reading.variance_m2))
-        if reading.disturbance:
-            self.report(
-                DiagnosticStatus.WARN,
-                zone,
-                reading.disturbance.split(":")[0],
-                values=[("detail", reading.disturbance)],
-                stamp_ns=block.stamp_ns,
-            )
-        else:
-            self.report(DiagnosticStatus.OK, zone, "undisturbed", stamp_ns=block.stamp_ns)
+            block = Waveform.from_cdr(raw)
+            stamp_ns = block.stamp_ns
+            reading = self._station.read(block.samples[0]) if self.switched_on else NOTHING_HEARD
+        antenna.publish(antenna.writer.write(stamp_ns, reading.range_m, reading.variance_m2))
+        if reading.disturbance != antenna.disturbance:
+            antenna.disturbance = reading.disturbance
+            self._report_disturbance(zone, reading.disturbance, stamp_ns)
+
+    def _report_disturbance(self, zone: str, disturbance: str, stamp_ns: int) -> None:
+        self.report(
+            DiagnosticStatus.WARN if disturbance else DiagnosticStatus.OK,
+            zone,
+            disturbance.split(":")[0] or "undisturbed",
+            values=[("detail", disturbance)],
+            stamp_ns=stamp_ns,
+        )
 
 
 def main() -> None:

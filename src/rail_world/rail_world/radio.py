@@ -18,6 +18,7 @@ from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.delay import fractional_delay
 from rail_signals.phasors import cis, rotation
 
+from rail_world.noise import NoiseSource
 from rail_world.radio_description import AntennaPattern, RadioDescription
 
 FloatArray = NDArray[np.float64]
@@ -244,7 +245,7 @@ class RadioMedium:
             strongest = max((keep[row] for row in rows), key=lambda link: power_mw[link])
             noise_mw = self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
             noise = self._noise.block(stage, port[0] * 128 + port[1], tick)
-            noise *= np.sqrt(noise_mw / 2.0)
+            noise *= np.float32(np.sqrt(noise_mw))
             total += noise
             received[port] = Reception(
                 total, float(power_mw[strongest]), noise_mw, links[strongest][1:3]
@@ -276,26 +277,3 @@ class RadioMedium:
             )
             total += 10.0 ** ((fault.power_dbm + gain_db - loss_db) / 10.0)
         return total
-
-
-class NoiseSource:
-    """White complex noise that depends on nothing but (seed, stage, port, tick).
-
-    A counter-based generator is set to a place of its own for each block, so that neither
-    the order of the blocks nor a missing one changes any other.
-    """
-
-    def __init__(self, seed: int, samples: int) -> None:
-        self._bits = np.random.Philox(np.random.SeedSequence([seed, 1]))
-        self._state = self._bits.state
-        self._generator = np.random.Generator(self._bits)
-        self._shape = (samples, 2)
-
-    def block(self, stage: int, port: int, tick: int) -> ComplexArray:
-        """Complex noise with unit variance in each part."""
-        self._state["state"]["counter"][:] = (0, stage, port, tick)
-        self._state["buffer_pos"] = 4
-        self._state["has_uint32"] = 0
-        self._bits.state = self._state
-        parts = self._generator.standard_normal(self._shape, dtype=np.float32)
-        return parts.astype(np.float64).view(np.complex128)[:, 0]

@@ -19,7 +19,7 @@ from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter, figures_from_cdr
-from rail_msgs_py.waveform import Waveform, silence
+from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
 
 from rail_world.radio import Paths, RadioMedium, Reception, TrainAntennas
 from rail_world.world_file import read_world_file
@@ -93,6 +93,10 @@ class RadioMediumNode(CorridorNode):
         self._links_table = TableWriter(radio.trains, topics.LINK_COLUMNS)
         self._links = self.publisher(topics.LINKS).publish
         self._done = self.stream_out(topics.DONE, node=self.get_fully_qualified_name())
+        self._silence = {
+            channel: RepeatedBlock(silence(0, radio.sample_rate_hz, carrier_hz, channel))
+            for channel, carrier_hz in radio.carriers_hz.items()
+        }
         self._paths: Paths | None = None
         self._heard: dict[tuple[int, int], Reception] = {}
         self._stage_begun_s = float("inf")
@@ -172,9 +176,9 @@ class RadioMediumNode(CorridorNode):
         return links
 
     def _block(self, stamp_ns: int, channel: int, reception: Reception | None) -> bytes:
-        rate_hz, carrier_hz = self._radio.sample_rate_hz, self._radio.carriers_hz[channel]
         if reception is None:
-            return silence(stamp_ns, rate_hz, carrier_hz, channel).to_cdr()
+            return self._silence[channel].at(stamp_ns)
+        rate_hz, carrier_hz = self._radio.sample_rate_hz, self._radio.carriers_hz[channel]
         samples = reception.samples[None, :]
         return Waveform(stamp_ns, rate_hz, carrier_hz, channel, samples).to_cdr()
 

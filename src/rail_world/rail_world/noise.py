@@ -1,0 +1,49 @@
+"""White Gaussian noise for every antenna, each block drawn at a place of its own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+_WORD = np.float32(2.0**-32)
+_TURN = np.float32(2.0 * math.pi * 2.0**-32)
+
+
+class NoiseSource:
+    """Complex noise that depends on nothing but (seed, stage, port, tick).
+
+    A counter-based generator is set to a place of its own for each block, so that neither the
+    order of the blocks nor a missing one changes any other. One 64-bit word makes one complex
+    number (Box and Muller, 1958), in single precision: twice as fast as the generator's own
+    normals, and white noise has no use for more digits. The tails reach to 4.7 sigma of the
+    amplitude's 1 / sqrt(2) parts, 6.6 sigma of a part.
+
+    Parameters
+    ----------
+    seed : int
+    samples : int
+        Length of a block.
+    """
+
+    def __init__(self, seed: int, samples: int) -> None:
+        self._bits = np.random.Philox(np.random.SeedSequence([seed, 1]))
+        self._state = self._bits.state
+        self._samples = samples
+
+    def block(self, stage: int, port: int, tick: int) -> NDArray[np.complex64]:
+        """Noise [sample] with a mean power of 1."""
+        state = self._state
+        state["state"]["counter"][:] = (0, stage, port, tick)
+        state["buffer_pos"] = 4
+        self._bits.state = state
+        words = self._bits.random_raw(self._samples).view(np.uint32).astype(np.float32)
+        first, second = words[: self._samples], words[self._samples :]
+        # From (0, 2^32]: a logarithm of zero would be infinite.
+        radius = np.sqrt(-np.log((first + np.float32(0.5)) * _WORD))
+        angle = second * _TURN
+        noise = np.empty(self._samples, dtype=np.complex64)
+        np.multiply(radius, np.cos(angle), out=noise.real)
+        np.multiply(radius, np.sin(angle), out=noise.imag)
+        return noise

@@ -215,6 +215,43 @@ def bench(
     raise typer.Exit(run_benchmarks(tuple(names or ()), json))
 
 
+@app.command()
+def campaign(
+    what: Annotated[str, typer.Argument(help="What to put to the test: handover.", metavar="WHAT")],
+    crossings: Annotated[
+        int, typer.Option("--crossings", help="At least so many per situation.", metavar="N")
+    ] = 200,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the first run.", metavar="N")] = 1,
+    json: Annotated[
+        Optional[Path], typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
+    ] = None,
+) -> None:
+    """Run many generated scenarios and count what must not happen; exit code 1 if it did."""
+    _choice("WHAT", what, ("handover",))
+    if not 1 <= crossings <= 1_000_000:
+        raise UsageError(f"--crossings: {crossings}: must be from 1 to 1000000")
+    if not 0 <= seed < 2**62:
+        raise UsageError(f"--seed: {seed}: must be from 0 to 2**62")
+    if json is not None:
+        _check_writable("--json", json)
+
+    from rich.console import Console
+
+    from .campaign import RunFailedError, print_rows, run_campaign, write_rows
+    from .campaign_scenarios import situations
+
+    console = Console()
+    try:
+        rows = list(run_campaign(situations(), crossings, seed, console))
+    except RunFailedError as error:
+        print(f"rail: {error}", file=sys.stderr)
+        raise typer.Exit(1) from None
+    print_rows(rows, console)
+    if json is not None:
+        write_rows(rows, json)
+    raise typer.Exit(1 if any(row.violations for row in rows) else 0)
+
+
 def main() -> None:
     """Entry point: every wrong input is one line and exit code 2."""
     from .errors import InputError

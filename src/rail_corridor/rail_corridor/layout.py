@@ -109,14 +109,18 @@ class Layout:
         At a station the zone that begins there; a branch, before its fouling point, lies in the
         zone of the track it leaves.
         """
+        return self.place_at(track, chainage_m)[0]
+
+    def place_at(self, track: str, chainage_m: float) -> tuple[Zone, float]:
+        """Return the zone a point is in, and its chainage along the track of that zone [m]."""
         zones = self._on_track[track]
         if chainage_m < zones[0].start_m:
             for point in self.fouling_points:
                 if point.branch == track:
                     chainage_m = min(point.at_m + chainage_m, math.nextafter(point.track_m, 0.0))
-                    return self.zone_at(point.track, chainage_m)
+                    return self.place_at(point.track, chainage_m)
         inside = [zone for zone in zones if zone.start_m <= chainage_m]
-        return inside[-1] if inside else zones[0]
+        return (inside[-1] if inside else zones[0]), chainage_m
 
 
 def place_stations(network: Network, plan: StationPlan, channels: ChannelPlan) -> Layout:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from rail_msgs_py.topics import LINK_COLUMNS, STATE_COLUMNS
 from rail_signals.bounds import two_way_range_variance_bound
 
@@ -18,6 +19,9 @@ from .scenario import Scenario
 #: A handover must be done when the train is this far past the station, plus one tick of travel.
 HANDOVER_DEPTH_M = 20.0
 _MIN_SLOPE = 0.05
+#: A position is misleading when it is off by more than so many sigma and one metre.
+_MISLEADING_SIGMAS = 6.0
+_MISLEADING_M = 1.0
 
 _STATE = {name: index for index, name in enumerate(STATE_COLUMNS)}
 _LINK = {name: index for index, name in enumerate(LINK_COLUMNS)}
@@ -44,31 +48,36 @@ def train_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[
         state[:, _STATE["speed_mps"]],
         state[:, _STATE["on_line"]] > 0.0,
     )
-    zones = _zones_of(scenario.layout, recording.tracks, run)
+    zones, along_m = _places_of(scenario.layout, recording.tracks, run)
     channel = recording.channel.upto(recording.ticks)[:, index, 0]
     travelled_m = float(np.nansum(np.abs(np.diff(run.path_m)))) if run.path_m.size else 0.0
     return {
         "distance_m": travelled_m,
-        "handovers": handovers(scenario, run.chainage_m, run.speed_mps, zones, channel),
-        "phase_ranging": _ranging(scenario, recording, index, run, zones, channel),
+        "handovers": handovers(scenario, along_m, run.speed_mps, zones, channel),
+        "phase_ranging": _ranging(scenario, recording, index, run, zones, along_m, channel),
     }
 
 
-def _zones_of(
+def _places_of(
     layout: Layout, tracks: tuple[str, ...], run: _Run
-) -> list[Zone | None]:
-    """Zone that the train is in at each tick, None while it is not on the line."""
+) -> tuple[list[Zone | None], FloatArray]:
+    """Zone that the train is in at each tick, and the chainage [tick] along that zone's track.
+
+    There is none while the train is not on the line.
+    """
     zones: list[Zone | None] = []
+    along_m = np.full(run.chainage_m.size, np.nan)
     last: Zone | None = None
-    for on_line, track, chainage_m in zip(run.on_line, run.track, run.chainage_m, strict=True):
-        if not on_line:
+    for tick, chainage_m in enumerate(run.chainage_m):
+        if not run.on_line[tick]:
             zones.append(None)
             continue
-        name = tracks[int(track)]
+        name = tracks[int(run.track[tick])]
+        along_m[tick] = chainage_m
         if last is None or last.track != name or not last.start_m <= chainage_m < last.end_m:
-            last = layout.zone_at(name, float(chainage_m))
+            last, along_m[tick] = layout.place_at(name, float(chainage_m))
         zones.append(last)
-    return zones
+    return zones, along_m
 
 
 def handovers(
@@ -77,15 +86,19 @@ def handovers(
     speed_mps: FloatArray,
     zones: list[Zone | None],
     channel: FloatArray,
-) -> dict[str, int]:
+) -> dict[str, Any]:
     """Count handovers of one train.
+
+    ``chainage_m`` [tick] is along the track of the zone the train is in.
 
     One is *expected* when the train has left a zone for another for good: when it is
     `HANDOVER_DEPTH_M` and one tick of travel inside. It is *made* if the transponder is on the
     channel of that zone by then, else *missed*. A change to a channel that belongs to no zone
-    this close is *wrong*.
+    this close is *wrong*. ``furthest_m`` is the longest distance from the station between two zones
+    at which the channel changed from one to the other, None if it never did.
     """
     expected = made = wrong = 0
+    furthest_m: float | None = None
     confirmed: Zone | None = None
     before = 0.0
     for tick, zone in enumerate(zones):
@@ -97,9 +110,11 @@ def handovers(
         if confirmed is None:
             confirmed = zone
         elif zone is not confirmed and zone.downlink_channel != confirmed.downlink_channel:
-            inside_m = min(here - zone.start_m, zone.end_m - here) if (
-                zone.track == confirmed.track
-            ) else here - zone.start_m
+            inside_m = here - zone.start_m
+            if zone.track == confirmed.track:
+                inside_m = min(inside_m, zone.end_m - here)
+            elif confirmed.previous == zone.name:  # back from the branch
+                inside_m = zone.end_m - here
             if inside_m >= depth_m:
                 expected += 1
                 made += int(in_force == zone.downlink_channel)
@@ -109,9 +124,17 @@ def handovers(
         if in_force > 0.0 and before > 0.0 and in_force != before:
             near = _zones_near(scenario.layout, zone, here, depth_m)
             wrong += int(in_force not in {z.downlink_channel for z in near})
+            away_m = min(here - zone.start_m, zone.end_m - here)
+            furthest_m = max(away_m, furthest_m or 0.0)
         if in_force > 0.0:
             before = in_force
-    return {"expected": expected, "made": made, "missed": expected - made, "wrong": wrong}
+    return {
+        "expected": expected,
+        "made": made,
+        "missed": expected - made,
+        "wrong": wrong,
+        "furthest_m": _figure(furthest_m) if furthest_m is not None else None,
+    }
 
 
 def _zones_near(layout: Layout, zone: Zone, chainage_m: float, depth_m: float) -> list[Zone]:
@@ -129,6 +152,7 @@ def _ranging(
     index: int,
     run: _Run,
     zones: list[Zone | None],
+    along_m: FloatArray,
     channel: FloatArray,
 ) -> dict[str, Any]:
     """Position by phase ranging against the truth and against what the links allow."""
@@ -144,11 +168,21 @@ def _ranging(
     track = np.where(known, position[:, 0], 0.0).astype(int)
     error_m = offsets[track] + position[:, 1] - run.path_m
     wrong_track = known & np.isnan(offsets[track])
+    for tick in np.flatnonzero(known & ~wrong_track & (track != run.track)):
+        name = recording.tracks[track[tick]]
+        claimed, true = scenario.layout.zone_at(name, float(position[tick, 1])), zones[tick]
+        assert true is not None
+        depth_m = HANDOVER_DEPTH_M + abs(run.speed_mps[tick]) * scenario.tick_s
+        wrong_track[tick] = claimed.track != true.track and not _meet(
+            claimed, true, along_m[tick] - true.start_m < depth_m
+        )
     usable = known & ~wrong_track
     bound_m2 = _bound_m2(scenario, recording, index, run, zones, channel, links)
     with np.errstate(invalid="ignore"):
         bounded = usable & np.isfinite(bound_m2)
         normalised = error_m[usable] ** 2 / position[usable, 2]
+        allowed_m = _MISLEADING_M + _MISLEADING_SIGMAS * np.sqrt(position[:, 2])
+        misleading = wrong_track | (usable & (np.abs(error_m) > allowed_m))
     on_line = int(np.count_nonzero(run.on_line))
     return {
         "availability": _ratio(np.count_nonzero(known), on_line),
@@ -158,7 +192,19 @@ def _ranging(
         "max_m": _figure(np.max(np.abs(error_m[usable]))) if usable.any() else None,
         "normalised_error": _root_mean(normalised),
         "wrong_track_ticks": int(np.count_nonzero(wrong_track)),
+        "misleading_ticks": int(np.count_nonzero(misleading)),
     }
+
+
+def _meet(claimed: Zone, true: Zone, at_station: bool) -> bool:
+    """Whether a place in one zone may be told as one in another without being on a wrong track.
+
+    One begins where the other ends; or both begin at the station of a junction, and the train
+    may not have changed to its own yet.
+    """
+    if claimed.name in true.next or true.name in claimed.next:
+        return True
+    return at_station and claimed.station == true.station
 
 
 def _bound_m2(
@@ -182,7 +228,9 @@ def _bound_m2(
     state = recording.state.upto(recording.ticks)[:, index]
     columns = [_STATE[name] for name in ("x_m", "y_m", "z_m", "heading_rad")]
     where = state[:, columns]
-    ranged = [_ranging_zone(scenario.layout, zone, c) for zone, c in zip(zones, channel)]
+    ranged = [
+        _ranging_zone(scenario.layout, zone, c) for zone, c in zip(zones, channel, strict=True)
+    ]
     for zone in {z.name: z for z in ranged if z is not None}.values():
         ticks = np.array([tick for tick, z in enumerate(ranged) if z is not None and z is zone])
         line = where[ticks, :3] - np.array(scenario.layout.station(zone.station).position_m)
@@ -195,7 +243,7 @@ def _bound_m2(
 
 
 def _ranging_zone(layout: Layout, zone: Zone | None, channel: float) -> Zone | None:
-    """The zone whose station ranges the train: its own, or a neighbour it is still tuned to."""
+    """Return the zone whose station ranges the train: its own, or one it is still tuned to."""
     if zone is None:
         return None
     around = [zone]

@@ -42,6 +42,7 @@ def steps(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     monkeypatch.setattr(script, "make_environment", make)
     monkeypatch.setattr(script, "run_pip", lambda arguments: taken.append("project"))
+    monkeypatch.setattr(script, "compile_what_runs", lambda: None)
     return taken
 
 

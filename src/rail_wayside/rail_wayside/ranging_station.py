@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
 from rail_signals.comparators import and_comparator
 from rail_signals.line_receiver import LineReceiver, ToneEstimate
 from rail_signals.phase_range import (
@@ -22,10 +23,13 @@ Comparator = Literal["and", "quadrature", "two_tone"]
 
 #: Line residuals this far above the noise are another signal (chi-square per degree of freedom).
 MISFIT_LIMIT = 6.0
-#: ... if they also hold this share of the signal: -50 dB moves the range by 0.2 m at most.
+#: ... if they also hold this share of the signal. A second train 40 m or more from the first is
+#: told down to -20 dB; what is missed moves the range by its relative amplitude times c / 4 pi f.
 MISFIT_SHARE = 1e-5
 #: Noise this far above the expected is a jammer [dB].
 JAMMING_LIMIT_DB = 6.0
+#: ... or another signal whose carrier lies far off: then less misfit is enough.
+JAMMED_MISFIT_LIMIT = 2.5
 
 _GRID = 64  # samples per tone period in front of the AND gate
 
@@ -97,10 +101,14 @@ class RangingStation:
         noise_mw = amplitude**2 / float(estimate.snr)
         misfit = float(estimate.misfit)
         share = misfit / (float(estimate.snr) * burst.size)
-        if misfit > MISFIT_LIMIT and share > MISFIT_SHARE:
+        jammed = noise_mw > self._jamming_mw
+        limit = JAMMED_MISFIT_LIMIT if jammed else MISFIT_LIMIT
+        if misfit > limit and share > MISFIT_SHARE:
             return Reading(math.nan, math.inf, "more than one signal in the zone")
         range_m, variance_m2 = self._compare(estimate, burst)
-        if noise_mw > self._jamming_mw:
+        if math.isnan(range_m):
+            return Reading(math.nan, math.inf, "too weak to tell the cycle of the tone")
+        if jammed:
             # The variance says what the jammer costs; that there is one is said as well.
             return Reading(range_m, variance_m2, _jammed(noise_mw))
         return Reading(range_m, variance_m2)

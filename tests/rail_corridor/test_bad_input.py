@@ -13,7 +13,7 @@ import yaml
 
 from rail_corridor.errors import InputError
 from rail_corridor.overrides import Overrides
-from rail_corridor.scenario import load_scenario
+from rail_corridor.scenario import builtin_scenarios, load_scenario
 
 GOOD: dict[str, Any] = {
     "name": "good",
@@ -325,7 +325,7 @@ def test_a_missing_file_and_an_unknown_name(tmp_path: Path) -> None:
     message = complaint(lambda: load_scenario("dmeo"))
     assert message == (
         "dmeo: there is no such file, and no built-in scenario of that name"
-        " (branch, demo, plain_line, real_line)"
+        f" ({', '.join(sorted(builtin_scenarios()))})"
     )
 
 

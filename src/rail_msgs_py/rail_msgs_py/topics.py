@@ -63,9 +63,7 @@ class Topic:
         return re.fullmatch(expression, name) is not None
 
 
-CLOCK: Final = Topic(
-    "/clock", Clock, STREAM, None, "world", "wrs, vrs, zone_controller", "Start of a tick."
-)
+CLOCK: Final = Topic("/clock", Clock, STREAM, None, "world", "wrs", "Start of a tick.")
 STATE: Final = Topic(
     "/world/state",
     Float64MultiArray,

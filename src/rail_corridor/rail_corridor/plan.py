@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+
 from rail_world.radio import THERMAL_NOISE_DBM_PER_HZ
 from rail_world.radio_description import (
     AntennaPattern,
@@ -159,14 +160,18 @@ def _signal(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def _station(scenario: Scenario, layout: Layout, name: str) -> NodeSpec:
-    zones = [layout.zone(zone) for zone in layout.station(name).zones]
-    carriers = scenario.channels.carriers_hz
-    noise_dbm = (
+def _noise_dbm(scenario: Scenario) -> float:
+    """Noise of every receiver in the bandwidth of a burst."""
+    return (
         THERMAL_NOISE_DBM_PER_HZ
         + scenario.radio.noise_figure_db
         + 10.0 * math.log10(scenario.ranging.sample_rate_hz)
     )
+
+
+def _station(scenario: Scenario, layout: Layout, name: str) -> NodeSpec:
+    zones = [layout.zone(zone) for zone in layout.station(name).zones]
+    carriers = scenario.channels.carriers_hz
     parameters = {
         **_signal(scenario),
         "zones": tuple(zone.name for zone in zones),
@@ -176,7 +181,7 @@ def _station(scenario: Scenario, layout: Layout, name: str) -> NodeSpec:
         "power_dbm": scenario.radio.wrs_power_dbm,
         "comparator": scenario.ranging.comparator,
         "delay_s": scenario.transponder.delay_s,
-        "noise_dbm": noise_dbm,
+        "noise_dbm": _noise_dbm(scenario),
     }
     return NodeSpec("wrs", f"/wayside/{name}", "wayside", parameters)
 
@@ -196,6 +201,7 @@ def _vehicle(scenario: Scenario, name: str, unit: Transponder) -> NodeSpec:
         "power_dbm": scenario.radio.vrs_power_dbm,
         "transponder_delay_s": unit.delay_s,
         "delay_trim_s": unit.trim_s,
+        "noise_dbm": _noise_dbm(scenario),
     }
     return NodeSpec("vrs", f"/{name}/vrs", "onboard", parameters)
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from diagnostic_msgs.msg import DiagnosticStatus
+from numpy.typing import NDArray
+
 from rail_msgs_py import topics
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import Equipment
@@ -20,11 +21,11 @@ from rail_msgs_py.signal_parameters import SignalParameters, signal_of
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
 from rail_msgs_py.waveform import Waveform, silence, silent_stamp_ns
+from rail_onboard.channel_selector import ChannelSelector
+from rail_onboard.downlink_check import DownlinkCheck
 from rail_signals.line_receiver import LineReceiver, ToneEstimate
 from rail_signals.ranging_signal import modulate
 from rail_signals.transponder import reply_lag_rad
-
-from rail_onboard.channel_selector import ChannelSelector
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,9 @@ class VrsParameters(SignalParameters):
     delay_trim_s: float = parameter(
         0.0, "added on the bench to bring it to that of the fleet", unit="s", low=-1e-3, high=1e-3
     )
+    noise_dbm: float = parameter(
+        -100.0, "receiver noise expected in the bandwidth", unit="dBm", low=-150.0, high=0.0
+    )
 
 
 class VrsNode(Equipment):
@@ -57,9 +61,7 @@ class VrsNode(Equipment):
         parameters: Mapping[str, Any] | None = None,
         services: bool = True,
     ) -> None:
-        super().__init__(
-            name, namespace, context=context, parameters=parameters, services=services
-        )
+        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
         self._p = declare(self, VrsParameters)
         channels = self._p.downlink_channels
         if not len(channels) == len(self._p.uplink_channels) == len(self._p.uplink_carriers_hz):
@@ -69,6 +71,7 @@ class VrsNode(Equipment):
             )
         self._signal = signal_of(self._p)
         self._receiver = LineReceiver(self._signal)
+        self._check = DownlinkCheck(10.0 ** (self._p.noise_dbm / 10.0), self._signal.samples)
         self._selector = ChannelSelector(dict(zip(channels, self._p.uplink_channels, strict=True)))
         self._carriers_hz = dict(
             zip(self._p.uplink_channels, self._p.uplink_carriers_hz, strict=True)
@@ -76,7 +79,9 @@ class VrsNode(Equipment):
         self._amplitude = 10.0 ** (self._p.power_dbm / 20.0)
         self._delay_s = self._p.transponder_delay_s + self._p.delay_trim_s
         train = namespace.strip("/")
-        self._inbox: TickInbox[NDArray[np.complex128] | None] = TickInbox(str(channel) for channel in channels)
+        self._inbox: TickInbox[NDArray[np.complex128] | None] = TickInbox(
+            str(channel) for channel in channels
+        )
         for channel in channels:
             self.stream_in(
                 topics.VRS_RX,
@@ -113,12 +118,20 @@ class VrsNode(Equipment):
                 dbm = 20.0 * np.log10(estimates.amplitude)
             levels = {c: float(dbm[row]) for c, row in rows.items() if estimates.detected[row]}
         downlink = self._selector.update(levels)
-        if estimates is None or downlink not in levels:
+        disturbance = "cannot read the tone" if bursts else "hears no station"
+        if estimates is not None and downlink in levels:
+            row = rows[downlink]
+            disturbance = self._check.disturbance(
+                amplitude=float(estimates.amplitude[row]),
+                snr=float(estimates.snr[row]),
+                misfit=float(estimates.misfit[row]),
+            )
+        if estimates is None or disturbance:
             self._send(self._silence(stamp_ns))
         else:
             self._send(self._reply(stamp_ns, estimates, rows[downlink]))
         self._publish_channel(stamp_ns, levels)
-        self._report(stamp_ns, downlink in levels, bool(bursts))
+        self._report(stamp_ns, disturbance)
 
     def _reply(self, stamp_ns: int, estimates: ToneEstimate, row: int) -> bytes:
         uplink = self._selector.uplink
@@ -140,15 +153,13 @@ class VrsNode(Equipment):
             self._figures[0, column] = levels.get(channel, -np.inf)
         self._channel(self._channel_table.write(stamp_ns, self._figures))
 
-    def _report(self, stamp_ns: int, answering: bool, hearing: bool) -> None:
-        if answering or not self.switched_on:
+    def _report(self, stamp_ns: int, disturbance: str) -> None:
+        if not disturbance or not self.switched_on:
             self.report(DiagnosticStatus.OK, "ranging", "answering", stamp_ns=stamp_ns)
-        elif hearing:
-            self.report(
-                DiagnosticStatus.WARN, "ranging", "cannot read the tone", stamp_ns=stamp_ns
-            )
-        else:
-            self.report(DiagnosticStatus.WARN, "ranging", "hears no station", stamp_ns=stamp_ns)
+            return
+        on = f" on CH{self._selector.downlink}" if self._selector.downlink else ""
+        message = disturbance if disturbance == "hears no station" else f"{disturbance}{on}"
+        self.report(DiagnosticStatus.WARN, "ranging", message, stamp_ns=stamp_ns)
 
 
 def main() -> None:

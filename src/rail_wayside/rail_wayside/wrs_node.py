@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
+
 from rail_msgs_py import topics
 from rail_msgs_py.node import Equipment
 from rail_msgs_py.parameters import ParameterError, declare, parameter
@@ -20,7 +21,6 @@ from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence, silent_stamp_ns
 from rail_signals.ranging_signal import modulate
-
 from rail_wayside.ranging_station import NOTHING_HEARD, RangingStation
 
 
@@ -53,6 +53,7 @@ class _Antenna:
     send: Callable[[bytes], None]
     publish: Callable[[bytes], None]
     writer: RangeWriter
+    uplink_channel: int
     disturbance: str = ""
 
 
@@ -68,9 +69,7 @@ class WrsNode(Equipment):
         parameters: Mapping[str, Any] | None = None,
         services: bool = True,
     ) -> None:
-        super().__init__(
-            name, namespace, context=context, parameters=parameters, services=services
-        )
+        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
         self._p = declare(self, WrsParameters)
         self._check_parameters()
         signal = signal_of(self._p)
@@ -84,8 +83,12 @@ class WrsNode(Equipment):
         samples = tone[None, :] * 10.0 ** (self._p.power_dbm / 20.0)
         low_m, high_m = self._station.interval_m
         self._antennas: list[_Antenna] = []
-        for zone, channel, carrier_hz in zip(
-            self._p.zones, self._p.downlink_channels, self._p.downlink_carriers_hz, strict=True
+        for zone, channel, uplink_channel, carrier_hz in zip(
+            self._p.zones,
+            self._p.downlink_channels,
+            self._p.uplink_channels,
+            self._p.downlink_carriers_hz,
+            strict=True,
         ):
             parts = {"site": name, "zone": zone}
             radio = (signal.sample_rate_hz, carrier_hz, channel)
@@ -95,6 +98,7 @@ class WrsNode(Equipment):
                 self.stream_out(topics.WRS_TX, **parts),
                 self.stream_out(topics.RANGE, **parts),
                 RangeWriter(zone, low_m, high_m),
+                uplink_channel,
             )
             self._antennas.append(antenna)
             self.stream_in(
@@ -139,13 +143,15 @@ class WrsNode(Equipment):
         antenna.publish(antenna.writer.write(stamp_ns, reading.range_m, reading.variance_m2))
         if reading.disturbance != antenna.disturbance:
             antenna.disturbance = reading.disturbance
-            self._report_disturbance(zone, reading.disturbance, stamp_ns)
+            self._report_disturbance(zone, antenna, stamp_ns)
 
-    def _report_disturbance(self, zone: str, disturbance: str, stamp_ns: int) -> None:
+    def _report_disturbance(self, zone: str, antenna: _Antenna, stamp_ns: int) -> None:
+        disturbance = antenna.disturbance
+        reason = disturbance.split(":")[0]
         self.report(
             DiagnosticStatus.WARN if disturbance else DiagnosticStatus.OK,
             zone,
-            disturbance.split(":")[0] or "undisturbed",
+            f"{reason} on CH{antenna.uplink_channel}" if reason else "undisturbed",
             values=[("detail", disturbance)],
             stamp_ns=stamp_ns,
         )

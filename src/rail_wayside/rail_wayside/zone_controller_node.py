@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
+
 from rail_msgs_py import topics
 from rail_msgs_py.failures import FailureWatch
 from rail_msgs_py.headers import header_to_cdr
@@ -20,7 +21,6 @@ from rail_msgs_py.parameters import ParameterError, declare, parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.range_reading import RangeReading
 from rail_msgs_py.standalone import run_node
-
 from rail_wayside.zone_map import Zone, ZoneMap
 from rail_wayside.zone_tracking import Fix, Reading, ZoneTracker
 

@@ -43,11 +43,14 @@ class Zone:
         """Chainage and its variance of a range, None where no point of the map is that far.
 
         Closer to the mast than the track itself passes, the nearest point of the track is
-        meant; four sigma past the end of the table, nothing is.
+        meant; but four sigma past the end of the table, or a metre more than that before its
+        begin, nothing is: such a range is one beyond the unambiguous interval.
         """
         distance_m, chainage_m = self.distance_m, self.chainage_m
         excess_m = range_m - float(distance_m[-1])
         if excess_m > 0.0 and excess_m > 4.0 * variance_m2**0.5:
+            return None
+        if float(distance_m[0]) - range_m > 1.0 + 4.0 * variance_m2**0.5:
             return None
         place = int(np.searchsorted(distance_m, range_m))
         place = min(max(place, 1), distance_m.size - 1)
@@ -71,6 +74,7 @@ class ZoneMap:
         self.zones = {zone.name: zone for zone in zones}
         self._ways: dict[str, dict[str, float]] = {}
         after = {name: tuple(following.get(name, ())) for name in self.zones}
+        self.following = after
         before: dict[str, list[str]] = {name: [] for name in self.zones}
         for name, names in after.items():
             for other in names:

@@ -2,7 +2,8 @@
 
 A transponder does not say which train it is on. As the signaller's train describer does, the
 controller knows which trains enter where, and then follows each from zone to zone: a reading
-belongs to the train that can have got there. What cannot be told is flagged, not guessed.
+belongs to the train that can have got there (`rail_wayside.association`). What cannot be told is
+flagged, not guessed.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rail_wayside.association import FOLLOWED_S, Candidate, LineOrder, associate
 from rail_wayside.zone_map import ZoneMap
 
 MAX_ACCELERATION_MPS2 = 2.0
@@ -79,9 +81,8 @@ class ZoneTracker:
 
     def __init__(self, zone_map: ZoneMap, trains: Sequence[tuple[str, str]]) -> None:
         self._map = zone_map
-        self._trains = [
-            _Train(name, zone, zone_map.zones[zone].start_m) for name, zone in trains
-        ]
+        self._trains = [_Train(name, zone, zone_map.zones[zone].start_m) for name, zone in trains]
+        self._order = LineOrder()
         self.unidentified: tuple[str, ...] = ()
         self.disturbed: tuple[str, ...] = ()
 
@@ -101,6 +102,7 @@ class ZoneTracker:
         self.unidentified = tuple(
             place.zone for index, place in enumerate(places) if index not in owners.values()
         )
+        self._learn_order(owners, places)
         shared = self._shared_zones(owners, places)
         fixes = []
         for index, train in enumerate(self._trains):
@@ -110,42 +112,59 @@ class ZoneTracker:
         return fixes
 
     def _assign(self, time_s: float, places: Sequence[_Place]) -> dict[int, int]:
-        """Index of the place of each train; every place is given once, the surest first."""
-        offers: list[tuple[float, int, int]] = []
-        for index, train in enumerate(self._trains):
-            if not train.entered:
-                continue
-            elapsed_s = time_s - train.seen_s
-            expected_m = train.speed_mps * elapsed_s
-            sigma_m = math.sqrt(max(train.p_vv, 0.0)) * elapsed_s
-            gate_m = GATE_M + 0.5 * MAX_ACCELERATION_MPS2 * elapsed_s**2 + SIGMAS * sigma_m
-            gate_m = min(gate_m, GATE_M + MAX_SPEED_MPS * elapsed_s)
-            for number, place in enumerate(places):
-                way_m = self._map.way_m(
-                    train.zone, train.filtered_m, place.zone, place.chainage_m
-                )
-                if way_m is None:
-                    continue
-                miss_m = abs(way_m - expected_m)
-                slack_m = gate_m + SIGMAS * math.sqrt(place.variance_m2)
-                if miss_m <= slack_m:
-                    offers.append((miss_m / slack_m, index, number))
-        owners: dict[int, int] = {}
-        taken: set[int] = set()
-        for _, index, number in sorted(offers):
-            if index not in owners and number not in taken:
-                owners[index] = number
-                taken.add(number)
-        # Trains that are due at a zone enter there in their order.
+        """Index of the place of each train."""
+        candidates: list[Candidate] = []
+        due: set[str] = set()
         for index, train in enumerate(self._trains):
             if train.entered:
+                misses = self._misses(train, time_s, places)
+                followed = time_s - train.seen_s <= FOLLOWED_S
+                candidates.append(Candidate(index, followed, misses))
+            elif train.zone not in due:
+                # Trains that are due at a zone enter there in their order.
+                due.add(train.zone)
+                here = (n for n, place in enumerate(places) if place.zone == train.zone)
+                candidates.append(Candidate(index, False, dict.fromkeys(here, 0.0)))
+        ways_m = {
+            (one, other): self._way_m(places[one], places[other])
+            for one in range(len(places))
+            for other in range(len(places))
+            if one != other
+        }
+        return associate(candidates, ways_m, self._order)
+
+    def _misses(self, train: _Train, time_s: float, places: Sequence[_Place]) -> dict[int, float]:
+        """How far each place in reach is from where the train is expected, over what it may be."""
+        elapsed_s = time_s - train.seen_s
+        expected_m = train.speed_mps * elapsed_s
+        sigma_m = math.sqrt(max(train.p_vv, 0.0)) * elapsed_s
+        gate_m = GATE_M + 0.5 * MAX_ACCELERATION_MPS2 * elapsed_s**2 + SIGMAS * sigma_m
+        gate_m = min(gate_m, GATE_M + MAX_SPEED_MPS * elapsed_s)
+        misses: dict[int, float] = {}
+        for number, place in enumerate(places):
+            way_m = self._map.way_m(train.zone, train.filtered_m, place.zone, place.chainage_m)
+            if way_m is None:
                 continue
-            for number, place in enumerate(places):
-                if number not in taken and place.zone == train.zone:
-                    owners[index] = number
-                    taken.add(number)
-                    break
-        return owners
+            miss_m = abs(way_m - expected_m)
+            slack_m = gate_m + SIGMAS * math.sqrt(place.variance_m2)
+            if miss_m <= slack_m:
+                misses[number] = miss_m / slack_m
+        return misses
+
+    def _way_m(self, one: _Place, other: _Place) -> float | None:
+        return self._map.way_m(one.zone, one.chainage_m, other.zone, other.chainage_m)
+
+    def _learn_order(self, owners: Mapping[int, int], places: Sequence[_Place]) -> None:
+        """Take note of who is ahead of whom among the trains seen now."""
+        seen = sorted(owners)
+        for position, one in enumerate(seen):
+            for other in seen[position + 1 :]:
+                here, there = places[owners[one]], places[owners[other]]
+                way_m = self._way_m(here, there)
+                zones = self._map.zones
+                if way_m is None and zones[here.zone].track == zones[there.zone].track:
+                    continue  # out of sight of each other, in an order that stays
+                self._order.learn(one, other, way_m)
 
     def _follow(self, train: _Train, time_s: float, place: _Place) -> None:
         """Step the train's filter on (chainage, speed) with a new place."""
@@ -184,9 +203,7 @@ class ZoneTracker:
             train.p_vv,
         )
 
-    def _shared_zones(
-        self, owners: Mapping[int, int], places: Sequence[_Place]
-    ) -> set[str]:
+    def _shared_zones(self, owners: Mapping[int, int], places: Sequence[_Place]) -> set[str]:
         """Zones in which two trains were last seen, one of which is not heard alone."""
         seen: dict[str, int] = {}
         for index, train in enumerate(self._trains):
@@ -203,18 +220,19 @@ class ZoneTracker:
             reading = readings[train.zone]
             outside_m = train.fix.chainage_m - zone.end_m
             if outside_m > 0.5 * zone.length_m:
-                reason = f"past the end of {train.zone}: no station answers there"
-                return _with_reason(train.fix, reason)
+                return _with_reason(train.fix, self._beyond(train.zone))
             if math.isfinite(reading.variance_m2):
                 return train.fix
         if not train.entered:
             reason = train.unknown
         elif train.zone in shared:
             reason = f"two trains in {train.zone}"
-        elif train.zone in self.disturbed or self._disturbed_near(train):
-            reason = f"{train.zone} disturbed"
+        elif (disturbed := self._disturbed_near(train)) is not None:
+            reason = f"{disturbed} disturbed"
         elif train.zone not in readings:
-            reason = f"station of {train.zone} does not answer"
+            reason = f"{zone.site} of {train.zone} does not answer"
+        elif train.chainage_m > zone.end_m + 0.5 * zone.length_m:
+            reason = f"lost {self._beyond(train.zone)}"
         else:
             reason = f"not heard in {train.zone}"
         return Fix(
@@ -228,17 +246,22 @@ class ZoneTracker:
             reason,
         )
 
-    def _disturbed_near(self, train: _Train) -> bool:
-        return any(
-            abs(way_m) < 1.5 * self._map.zones[name].length_m
-            for name in self.disturbed
-            if (
-                way_m := self._map.way_m(
-                    train.zone, train.chainage_m, name, self._map.zones[name].start_m
-                )
-            )
-            is not None
-        )
+    def _beyond(self, zone: str) -> str:
+        """Name the stations that should have taken over a train past the end of a zone."""
+        sites = sorted({self._map.zones[name].site for name in self._map.following[zone]})
+        silent = f"{' and '.join(sites)} does not answer" if sites else "the line ends there"
+        return f"past the end of {zone}: {silent}"
+
+    def _disturbed_near(self, train: _Train) -> str | None:
+        """Name a disturbed zone that the train may be in, None if there is none."""
+        if train.zone in self.disturbed:
+            return train.zone
+        for name in self.disturbed:
+            zone = self._map.zones[name]
+            way_m = self._map.way_m(train.zone, train.chainage_m, name, zone.start_m)
+            if way_m is not None and abs(way_m) < 1.5 * zone.length_m:
+                return name
+        return None
 
 
 def _with_reason(fix: Fix, reason: str) -> Fix:

@@ -87,7 +87,7 @@ class RadioMediumNode(CorridorNode):
                     topics.VRS_RX, train=train, channel=channel
                 )
         self._down: TickInbox[Any] = TickInbox([_STATE_PORT, *self._station_ports])
-        self._up: TickInbox[Any] = TickInbox(self._train_ports)
+        self._up: TickInbox[Any] = TickInbox([_STATE_PORT, *self._train_ports])
         self._watch = FailureWatch(self, owners, self._drop)
         self.stream_in(topics.STATE, self._on_state)
         self._links_table = TableWriter(radio.trains, topics.LINK_COLUMNS)
@@ -135,8 +135,8 @@ class RadioMediumNode(CorridorNode):
         self._stage_begun_s = self.steady_s()
         for port, publish in self._train_out.items():
             publish(self._block(stamp_ns, port[1], self._heard.get(port)))
-        if not self._trains:
-            self._deliver_uplink(stamp_ns, {})
+        # Ends the tick by itself where no train is left to answer.
+        self._up.put(stamp_ns, _STATE_PORT, None)
 
     def _deliver_uplink(self, stamp_ns: int, items: dict[str, Any]) -> None:
         assert self._paths is not None

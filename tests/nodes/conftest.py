@@ -62,7 +62,7 @@ class Graph:
     def add(self, node: Any) -> Any:
         """Spin a node, switched on if it is equipment; it ends with the test."""
         self._nodes.append(node)
-        if hasattr(node, "switch_on"):
+        if not getattr(node, "switched_on", True):
             node.switch_on()
         self._executor.add_node(node)
         return node

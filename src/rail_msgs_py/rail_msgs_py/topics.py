@@ -99,7 +99,7 @@ FINISHED: Final = Topic(
     LATCHED,
     None,
     "world",
-    "the launcher",
+    "the report",
     "The run has reached its end.",
 )
 CORRIDOR_PATH: Final = Topic(
@@ -152,7 +152,7 @@ FAILED: Final = Topic(
     DiagnosticStatus,
     LATCHED,
     None,
-    "whoever noticed: world, radio_medium, zone_controller, the launcher",
+    "world, radio_medium, zone_controller, the report for the launcher",
     "world, radio_medium, zone_controller, the report",
     "A node that is not waited for any longer, and why.",
 )

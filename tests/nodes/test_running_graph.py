@@ -1,0 +1,123 @@
+"""A whole corridor in one process, against the documented topics and parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rail_corridor.host import NODE_CLASSES, make_node
+from rail_corridor.observer import Observer
+from rail_corridor.plan import NodeSpec, make_plan
+from rail_corridor.scenario import Overrides, load_scenario
+from rail_corridor.topic_docs import PARAMETERS, document, main, type_name
+from rail_msgs_py.topics import ALL, kind_of
+
+TICKS = 30
+#: What rclpy itself offers beside the corridor's topics.
+ROS_OWN = ("/rosout", "/parameter_events")
+
+
+@dataclasses.dataclass
+class Corridor:
+    """The nodes of a run, by kind, and the report's ear."""
+
+    nodes: dict[str, list[Any]]
+    observer: Observer
+    specs: dict[str, NodeSpec]
+
+
+def start(graph: Any, directory: Path) -> Corridor:
+    """Run three seconds of the branch, every node in this process, to the end."""
+    scenario = load_scenario("branch", overrides=Overrides(duration_s=0.1 * TICKS))
+    plan = make_plan(scenario, directory)
+    nodes: dict[str, list[Any]] = {}
+    for spec in plan.nodes:
+        node = graph.add(make_node(spec, graph.context, True))
+        nodes.setdefault(spec.kind, []).append(node)
+    observer = Observer(plan, tuple(scenario.tracks), lambda: None, context=graph.context)
+    graph.add(observer)
+    graph.wait(lambda: observer.complete)
+    return Corridor(nodes, observer, {spec.name: spec for spec in plan.nodes})
+
+
+def test_every_topic_is_documented_and_used_as_documented(graph: Any, tmp_path: Path) -> None:
+    corridor = start(graph, tmp_path)
+    kinds = {spec.name.rpartition("/")[2]: spec.kind for spec in corridor.specs.values()}
+    kinds["report"] = "report"
+    seen = set()
+    strangers = []
+    for name, types in graph.bystander.get_topic_names_and_types():
+        if name in ROS_OWN or name.endswith("/transition_event"):
+            continue
+        topic = kind_of(name)
+        assert topic is not None, name
+        seen.add(topic.pattern)
+        assert types == [type_name(topic.type)]
+        for role, documented, ends in (
+            ("sends", topic.sender, graph.bystander.get_publishers_info_by_topic(name)),
+            ("reads", topic.readers, graph.bystander.get_subscriptions_info_by_topic(name)),
+        ):
+            for end in ends:
+                assert end.qos_profile.reliability == topic.qos.reliability
+                assert end.qos_profile.durability == topic.qos.durability
+                if end.node_name != "bystander":
+                    kind = kinds[end.node_name]
+                    if kind not in documented and "every node" not in documented:
+                        strangers.append((name, role, kind))
+    assert strangers == []
+    # And every documented topic is there.
+    assert seen == {topic.pattern for topic in ALL}
+
+
+def test_every_declared_parameter_is_documented(graph: Any, tmp_path: Path) -> None:
+    corridor = start(graph, tmp_path)
+    ros_own = {"use_sim_time", "start_type_description_service"}
+    assert set(corridor.nodes) == set(PARAMETERS) == set(NODE_CLASSES)
+    for kind, nodes in corridor.nodes.items():
+        fields = {field.name: field for field in dataclasses.fields(PARAMETERS[kind])}
+        for node in nodes:
+            declared = set(node.list_parameters([], 0).names)
+            declared = {name for name in declared if not name.startswith("qos_overrides")}
+            assert declared - ros_own == set(fields)
+            for name, field in fields.items():
+                described = node.describe_parameter(name)
+                assert described.description.startswith(field.metadata["text"])
+                assert described.read_only
+
+
+def test_the_run_is_whole_and_nothing_was_lost(graph: Any, tmp_path: Path) -> None:
+    observer = start(graph, tmp_path).observer
+    recording = observer.recording
+    assert observer.failures == []
+    assert recording.ticks == observer.finished_ticks == TICKS
+    for record in (recording.state, recording.links, recording.channel, recording.position):
+        assert record.ticks == TICKS
+
+
+def test_the_document_is_fresh() -> None:
+    path = Path(__file__).resolve().parents[2] / "docs" / "topics.md"
+    again = "run: python -m rail_corridor.topic_docs docs/topics.md"
+    assert path.read_text(encoding="utf-8") == document(), again
+
+
+def test_the_document_is_written_or_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "topics.md"
+    assert main([str(path)]) == 0
+    assert main([]) == 0
+    assert capsys.readouterr().out == path.read_text(encoding="utf-8")
+    assert main(["a", "b"]) == 2
+
+
+def test_every_field_of_every_node_is_described() -> None:
+    for parameters in PARAMETERS.values():
+        for field in dataclasses.fields(parameters):
+            assert field.metadata["text"].strip()
+            suffix = field.name.rpartition("_")[2]
+            units = {"s": "s", "hz": "Hz", "m": "m", "dbm": "dBm"}
+            if suffix in units:
+                assert field.metadata["unit"] == units[suffix], field.name

@@ -121,6 +121,9 @@ def _run(data: dict[str, Any]) -> dict[str, Any]:
             last = (done.stderr.strip() or done.stdout.strip()).splitlines()[-1:]
             raise RunFailedError(f"{data['name']}, seed {data['seed']}: {' '.join(last)}")
         found: dict[str, Any] = json.loads(report.read_text())
+        for failed in found["failures"]:
+            name = f"{data['name']}, seed {data['seed']}"
+            raise RunFailedError(f"{name}: {failed['node']}: {failed['reason']}")
         return found
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import sys
 import time
@@ -58,12 +59,16 @@ class ProcessGroup:
         try:
             # Ctrl-C in the terminal is the launcher's to handle.
             os.setsid()
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
             os.close(self._write_end)
             # The name that ps, top and pkill show.
             Path("/proc/self/comm").write_text(f"rail_{name}"[:15])
             die_with(self._read_end)
             work()
             code = 0
+            if select.select([self._read_end], [], [], 0.0)[0]:
+                remove_orphaned_segments()  # the launcher is gone, and with it who tidies up
         except BaseException:
             traceback.print_exc()
         finally:
@@ -117,18 +122,39 @@ def _how(status: int) -> str:
 def remove_orphaned_segments(
     directory: Path = Path("/dev/shm"), proc: Path = Path("/proc")
 ) -> list[Path]:
-    """Remove shared-memory segments of the middleware that no process maps any longer.
+    """Remove shared-memory segments of the middleware that no process has any longer.
 
-    A killed process leaves them behind. Only segments of this user that nobody maps go.
+    A killed process leaves them behind. A segment and its lock file stand or fall together:
+    the one is mapped, the other only open.
     """
-    segments = {str(path) for path in directory.glob("fastrtps_*") if _mine(path)}
-    if not segments:
+    families: dict[str, list[Path]] = {}
+    for path in directory.glob("fastrtps_*"):
+        if _mine(path):
+            families.setdefault(path.name.removesuffix("_el"), []).append(path)
+    if not families:
         return []
-    for maps in proc.glob("[0-9]*/maps"):
-        with contextlib.suppress(OSError):
-            text = maps.read_text()
-            segments -= {segment for segment in segments if segment in text}
-    return _removed(segments)
+    for process in proc.glob("[0-9]*"):
+        for name in _in_use(process, directory):
+            families.pop(name.removesuffix("_el"), None)
+    return _removed(path for paths in families.values() for path in paths)
+
+
+def _in_use(process: Path, directory: Path) -> set[str]:
+    """Names in a directory of what a process maps or has open."""
+    start = f"{directory}/"
+    names = set()
+    with contextlib.suppress(OSError):
+        for line in (process / "maps").read_text().splitlines():
+            place = line.find(start)
+            if place >= 0:
+                names.add(line[place + len(start) :].removesuffix(" (deleted)"))
+    with contextlib.suppress(OSError):
+        for link in (process / "fd").iterdir():
+            with contextlib.suppress(OSError):
+                target = str(link.readlink())
+                if target.startswith(start):
+                    names.add(target[len(start) :].removesuffix(" (deleted)"))
+    return names
 
 
 def _mine(path: Path) -> bool:
@@ -137,10 +163,10 @@ def _mine(path: Path) -> bool:
     return False
 
 
-def _removed(segments: Iterable[str]) -> list[Path]:
+def _removed(segments: Iterable[Path]) -> list[Path]:
     removed = []
     for segment in sorted(segments):
         with contextlib.suppress(OSError):
-            Path(segment).unlink()
-            removed.append(Path(segment))
+            segment.unlink()
+            removed.append(segment)
     return removed

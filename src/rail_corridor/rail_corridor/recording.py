@@ -61,6 +61,15 @@ class Recording:
         """Ticks whose truth has been received."""
         return self.state.ticks
 
+    @property
+    def missing_ticks(self) -> int:
+        """Ticks of which any figure has not arrived; 0 when nothing is lost."""
+        parts = (self.state, self.links, self.channel, self.position)
+        if not self.trains:
+            return 0
+        gaps = [np.isnan(part.upto(self.ticks)[:, :, 0]).any(axis=1) for part in parts]
+        return int(np.count_nonzero(np.logical_or.reduce(gaps)))
+
     def digest(self) -> str:
         """SHA-256 of everything the equipment estimated, to the last bit."""
         total = hashlib.sha256()

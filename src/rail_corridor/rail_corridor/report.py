@@ -48,6 +48,7 @@ def make_report(
         "nodes": nodes,
         "processes": processes,
         "complete": not interrupted,
+        "missing_ticks": recording.missing_ticks,
         "digest": recording.digest(),
         "failures": observer.failures,
         "events": [event for event in observer.events if event["level"] != "ok"],

@@ -1,0 +1,181 @@
+"""Fixtures that run corridors in processes of their own, on a domain of their own."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+
+from rail_msgs_py import topics
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Generous: it only makes a test fail that would otherwise hang.
+PATIENCE_S = 90.0
+_TOKEN = "RAIL_TEST_TOKEN"
+_domains = itertools.count(os.getpid())
+
+
+def wait_until(condition: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
+    """Return the first true value of a condition; fail after a long time."""
+    deadline_s = time.monotonic() + patience_s
+    while not (value := condition()):
+        assert time.monotonic() < deadline_s, f"waited {patience_s} s in vain"
+        time.sleep(0.01)
+    return value
+
+
+def _segments_of(processes: Iterable[int]) -> set[Path]:
+    found = set()
+    for pid in processes:
+        try:
+            maps = Path(f"/proc/{pid}/maps").read_text()
+        except OSError:
+            continue
+        found |= {Path(name) for name in re.findall(r"/dev/shm/fastrtps_\w+", maps)}
+    return found
+
+
+@dataclass
+class Rail:
+    """Runs ``rail`` commands that share a domain and a mark in their environment."""
+
+    directory: Path
+    domain: int = field(default_factory=lambda: 40 + next(_domains) % 60)
+    token: str = field(default_factory=lambda: uuid.uuid4().hex)
+    started: list[subprocess.Popen[str]] = field(default_factory=list)
+
+    @property
+    def environment(self) -> dict[str, str]:
+        sources = os.pathsep.join(str(path) for path in sorted((ROOT / "src").glob("rail_*")))
+        path = os.pathsep.join(filter(None, (sources, os.environ.get("PYTHONPATH"))))
+        mine = {"PYTHONPATH": path, "ROS_DOMAIN_ID": str(self.domain), _TOKEN: self.token}
+        return {**os.environ, **mine}
+
+    def start(self, *arguments: object, command: list[str] | None = None) -> subprocess.Popen[str]:
+        """Start ``rail`` or another command; its output goes to files."""
+        number = len(self.started)
+        with (
+            (self.directory / f"stdout_{number}").open("w") as stdout,
+            (self.directory / f"stderr_{number}").open("w") as stderr,
+        ):
+            process = subprocess.Popen(
+                [*(command or [sys.executable, "-m", "rail_corridor.cli"]), *map(str, arguments)],
+                stdout=stdout,
+                stderr=stderr,
+                text=True,
+                env=self.environment,
+                cwd=self.directory,
+            )
+        self.started.append(process)
+        return process
+
+    def output(self, process: subprocess.Popen[str]) -> str:
+        """Return what a process has written to its standard output."""
+        return (self.directory / f"stdout_{self.started.index(process)}").read_text()
+
+    def errors(self, process: subprocess.Popen[str]) -> str:
+        """Return what a process has written to its standard error."""
+        return (self.directory / f"stderr_{self.started.index(process)}").read_text()
+
+    def finish(self, process: subprocess.Popen[str]) -> int:
+        """Wait for the end of a process; return its exit code."""
+        return process.wait(timeout=PATIENCE_S)
+
+    def report(self, *arguments: object) -> dict[str, Any]:
+        """Run a corridor to its end and return its report."""
+        path = self.directory / f"report_{len(self.started)}.json"
+        process = self.start("run", *arguments, "--report", path)
+        assert self.finish(process) == 0, self.errors(process)
+        report: dict[str, Any] = json.loads(path.read_text())
+        return report
+
+    def processes(self) -> dict[int, str]:
+        """Return every living process that descends from this fixture: its id and its name."""
+        found = {}
+        for entry in Path("/proc").glob("[0-9]*"):
+            try:
+                if self.token.encode() not in (entry / "environ").read_bytes():
+                    continue
+                state = (entry / "stat").read_text().rsplit(")", 1)[1].split()[0]
+                if state != "Z":
+                    found[int(entry.name)] = (entry / "comm").read_text().strip()
+            except OSError:
+                continue
+        return found
+
+    def segments(self) -> set[Path]:
+        """Return the shared memory that these processes have open."""
+        return _segments_of(self.processes())
+
+    def left_behind(self, segments: set[Path]) -> set[Path]:
+        """Return those of the segments that are still there and that no process has open."""
+        everybody = (int(entry.name) for entry in Path("/proc").glob("[0-9]*"))
+        there = {path for path in segments if path.exists()}
+        return there - _segments_of(everybody)
+
+
+@pytest.fixture
+def rail(tmp_path: Path) -> Iterator[Rail]:
+    """Return a runner of ``rail``; whatever it has started is gone afterwards."""
+    runner = Rail(tmp_path)
+    yield runner
+    for pid in runner.processes():
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            continue
+    for process in runner.started:
+        process.wait()
+
+
+class Listener:
+    """An ordinary ROS node beside the corridor."""
+
+    def __init__(self, domain: int) -> None:
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node("test_listener", context=self.context)
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+
+    def listen(self, topic: topics.Topic, **parts: object) -> list[Any]:
+        """Subscribe; return the list that the messages are added to."""
+        heard: list[Any] = []
+        self.node.create_subscription(topic.type, topic.name(**parts), heard.append, topic.qos)
+        return heard
+
+    def until(self, condition: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
+        """Spin until a condition is true; fail after a long time."""
+        deadline_s = time.monotonic() + patience_s
+        while not (value := condition()):
+            assert time.monotonic() < deadline_s, f"waited {patience_s} s in vain"
+            self._executor.spin_once(timeout_sec=0.05)
+        return value
+
+    def close(self) -> None:
+        """End the node."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+
+
+@pytest.fixture
+def listener(rail: Rail) -> Iterator[Listener]:
+    """Return a node in the domain of the corridor."""
+    node = Listener(rail.domain)
+    yield node
+    node.close()

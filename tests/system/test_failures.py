@@ -1,0 +1,56 @@
+"""A process that is killed is named at once, and the corridor goes on without it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from rail_msgs_py import topics
+from rail_msgs_py.stamps import to_ns
+
+if TYPE_CHECKING:
+    from .conftest import Listener, Rail
+
+pytestmark = pytest.mark.system
+
+
+@pytest.mark.parametrize(
+    ("process", "node"),
+    [
+        ("rail_wrs5", "/wayside/wrs5"),
+        ("rail_train_b", "/train_b/vrs"),
+        ("rail_zone_contr", "/wayside/zone_controller"),
+    ],
+)
+def test_a_killed_process_is_named_and_the_corridor_goes_on(
+    rail: Rail, listener: Listener, process: str, node: str
+) -> None:
+    path = rail.directory / "report.json"
+    failed = listener.listen(topics.FAILED)
+    clock = listener.listen(topics.CLOCK)
+    run = rail.start(
+        *("run", "branch", "--duration", 30, "--rate", 5, "--processes", "site"),
+        *("--report", path),
+    )
+    listener.until(lambda: len(clock) > 10)
+    (pid,) = (pid for pid, name in rail.processes().items() if name == process)
+    os.kill(pid, signal.SIGKILL)
+    killed_s, killed_ns = time.monotonic(), to_ns(clock[-1].clock)
+    listener.until(lambda: node in {message.name for message in failed})
+    assert time.monotonic() - killed_s < 2.0
+    # It goes on: three more seconds of simulated time pass.
+    listener.until(lambda: to_ns(clock[-1].clock) > killed_ns + 3_000_000_000)
+    assert rail.finish(run) == 0
+    report = json.loads(path.read_text())
+    assert report["complete"]
+    assert report["ticks"] == 300
+    (failure,) = report["failures"]
+    assert failure["node"] == node
+    assert "SIGKILL" in failure["reason"]
+    assert node in rail.output(run)
+    assert not rail.processes()

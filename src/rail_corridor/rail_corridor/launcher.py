@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import signal
 import tempfile
@@ -14,7 +13,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from .host import node_class, run_nodes
-from .plan import WORLD, Placement, Plan, make_plan
+from .middleware import discover_on
+from .plan import WORLD, Placement, Plan, check_external, make_plan
 from .processes import ProcessGroup, remove_orphaned_segments
 from .report import make_report, print_report, write_report
 from .scenario import Scenario
@@ -34,12 +34,7 @@ class RunOptions:
     only: Literal["wayside", "onboard"] | None = None
     report: Path | None = None
     timeout_s: float = 5.0
-
-
-def discover_on(hosts: Literal["this", "all"]) -> None:
-    """Limit discovery to this host unless the user, or a split corridor, asks otherwise."""
-    wide = "SUBNET" if hosts == "all" else "LOCALHOST"
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", wide)
+    external: tuple[str, ...] = ()
 
 
 def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
@@ -54,6 +49,7 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
     directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
     try:
         plan = make_plan(scenario, directory, rate=options.rate, timeout_s=options.timeout_s)
+        check_external(plan, options.external)
         return _Run(scenario, options, plan, console).run()
     finally:
         shutil.rmtree(directory, ignore_errors=True)
@@ -73,7 +69,7 @@ class _Run:
         self._scenario, self._options, self._plan = scenario, options, plan
         self._console = console
         placement = options.placement or default_placement(plan)
-        self._groups = plan.groups(placement, options.only)
+        self._groups = plan.groups(placement, options.only, options.external)
         self._processes = ProcessGroup()
         self._signal = 0
         self._world_failed = False
@@ -92,6 +88,8 @@ class _Run:
             f"[bold]{self._plan.scenario}[/bold]: {nodes} nodes in {len(self._groups)} {plural}, "
             f"{self._plan.ticks * self._plan.tick_s:.0f} s to simulate"
         )
+        for name in self._options.external:
+            self._console.print(f"waiting for {name}, which somebody else runs")
         previous = {
             number: signal.signal(number, self._on_signal)
             for number in (signal.SIGINT, signal.SIGTERM)
@@ -115,10 +113,11 @@ class _Run:
     def _watch(self) -> None:
         """Observe the run until it ends. ROS is initialised here, after the forks."""
         import rclpy
-        from rail_msgs_py.standalone import FOREVER_S
         from rclpy.experimental.events_executor import EventsExecutor
         from rclpy.signals import SignalHandlerOptions
         from rclpy.task import Future
+
+        from rail_msgs_py.standalone import FOREVER_S
 
         from .observer import Observer
 
@@ -207,5 +206,3 @@ class _Run:
         if self._world_failed:
             return 1
         return 128 + self._signal if self._signal else 0
-
-

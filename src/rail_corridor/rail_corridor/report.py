@@ -66,16 +66,15 @@ def write_report(report: dict[str, Any], path: Path) -> None:
 def print_report(report: dict[str, Any], console: Console) -> None:
     """Show the report as a table."""
     table = Table(title=_title(report), title_justify="left", title_style="bold")
-    for heading in ("train", "travelled", "handovers", "position\nknown"):
-        table.add_column(heading, justify="left" if heading == "train" else "right")
-    for heading in ("RMSE", "bound", "95 %", "max"):
-        table.add_column(heading, justify="right")
+    headings = ("train", "km", "handovers", "known", "RMSE m", "bound m", "95 % m", "max m")
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "train" else "right", no_wrap=True)
     for name, train in report["trains"].items():
         ranging, changes = train["phase_ranging"], train["handovers"]
         problems = [f"{changes[key]} {key}" for key in ("missed", "wrong") if changes[key]]
         table.add_row(
             name,
-            f"{train['distance_m'] / 1000.0:.2f} km",
+            f"{train['distance_m'] / 1000.0:.2f}",
             f"{changes['made']} of {changes['expected']}" + "".join(f", {p}" for p in problems),
             _percent(ranging["availability"]),
             *(_metres(ranging[key]) for key in ("rmse_m", "bound_m", "p95_m", "max_m")),
@@ -86,7 +85,8 @@ def print_report(report: dict[str, Any], console: Console) -> None:
     console.print(
         f"{report['ticks']} ticks, {report['sim_time_s']:.1f} s simulated in "
         f"{report['wall_time_s']:.1f} s: {speed}{report['nodes']} nodes in "
-        f"{report['processes']} processes"
+        f"{report['processes']} {'process' if report['processes'] == 1 else 'processes'}",
+        soft_wrap=True,
     )
     console.print(f"digest {report['digest'][:16]} (the same for every placement and rate)")
     for failed in report["failures"]:
@@ -121,4 +121,4 @@ def _percent(share: float | None) -> str:
 
 
 def _metres(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f} m"
+    return "-" if value is None else f"{value:.3f}"

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import signal
+import socket
 import sys
-from collections.abc import Callable, Iterable
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import rclpy
@@ -19,26 +22,64 @@ from rail_msgs_py.parameters import ParameterError
 FOREVER_S = 1e6
 
 
-def spin(context: Any, nodes: Iterable[Any], until: Future | None = None) -> None:
-    """Spin nodes on one events executor until ``until`` is done or a signal arrives."""
+def spin(context: Any, nodes: Iterable[Any], until: Future | None = None) -> int:
+    """Spin nodes on one events executor until ``until`` is done or a signal arrives.
+
+    Returns
+    -------
+    int
+        Number of the signal that ended it, 0 if none did.
+    """
     executor = EventsExecutor(context=context)
     stop = until if until is not None else Future()
+    received: list[int] = []
 
-    def on_signal(number: int, frame: Any) -> None:
+    def on_signal(number: int) -> None:
+        received.append(number)
         if not stop.done():
             stop.set_result(None)
-        executor.wake()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, on_signal)
     for node in nodes:
         executor.add_node(node)
     try:
-        executor.spin_until_future_complete(stop, timeout_sec=FOREVER_S)
-    except (KeyboardInterrupt, ExternalShutdownException):
+        with signals_to(on_signal):
+            executor.spin_until_future_complete(stop, timeout_sec=FOREVER_S)
+    except ExternalShutdownException:
         pass
     finally:
         executor.shutdown()
+    return received[0] if received else 0
+
+
+@contextmanager
+def signals_to(handle: Callable[[int], None]) -> Iterator[None]:
+    """Call ``handle`` for SIGINT and SIGTERM, from a thread of its own.
+
+    The executor waits outside Python, where an ordinary handler would not run until the next
+    message comes.
+    """
+    numbers = {signal.SIGINT, signal.SIGTERM}
+    # Python writes the number of each signal here as it arrives, whatever the main thread does.
+    read_end, write_end = socket.socketpair()
+    write_end.setblocking(False)
+    previous = {number: signal.signal(number, lambda *_: None) for number in numbers}
+    previous_fd = signal.set_wakeup_fd(write_end.fileno(), warn_on_full_buffer=False)
+
+    def watch() -> None:
+        while received := read_end.recv(1):
+            handle(received[0])
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(previous_fd)
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+        write_end.close()
+        thread.join()
+        read_end.close()
 
 
 def run_node(make: Callable[[], Any]) -> None:

@@ -1,0 +1,104 @@
+"""Simulated seconds per second of the whole corridor, and how it grows with stations and trains.
+
+The peer is real time. The bound is the rate at which transport alone and arithmetic alone,
+measured in the same run, would go one after the other in one process.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from arithmetic_floor import arithmetic_ms
+from in_process import plan_of
+from transport_floor import transport_ms
+
+from rail_corridor.scenario import Scenario, load_scenario, scenario_from_data
+
+#: Stations and trains of the rows `corridor.scale_*`.
+SCALES = ((10, 5), (30, 5), (114, 1), (114, 5), (114, 10), (114, 20))
+ZONE_M = 200.0
+_FLOOR_TICKS = 100
+
+
+def rows(names: tuple[str, ...] = ()) -> Iterator[dict[str, Any]]:
+    """Measure, and yield one row per figure."""
+    cases: list[tuple[str, Scenario]] = [("corridor.demo", load_scenario("demo"))]
+    for stations, trains in SCALES:
+        cases.append(
+            (f"corridor.scale_{stations}_stations_{trains}_trains", line(stations, trains))
+        )
+    for name, scenario in cases:
+        if not names or any(name == n or name.startswith(n) for n in names):
+            yield _row(name, scenario)
+
+
+def line(stations: int, trains: int, seconds: float = 30.0) -> Scenario:
+    """A straight line with trains spread over it, all running: nobody enters or leaves."""
+    length_m = stations * ZONE_M
+    return scenario_from_data(
+        {
+            "name": "scale",
+            "seed": 3,
+            "duration_s": seconds,
+            "tracks": {"main": {"elements": [{"straight_m": length_m}], "speed_limits": [[0, 80]]}},
+            "stations": {"zone_length_m": ZONE_M},
+            "trains": [
+                {
+                    "name": f"train{i}",
+                    "route": ["main"],
+                    "start_m": 50.0 + i * length_m / trains,
+                    "speed_kmh": 60.0,
+                }
+                for i in range(trains)
+            ],
+        },
+        directory=Path.cwd(),
+    )
+
+
+def _row(name: str, scenario: Scenario) -> dict[str, Any]:
+    report = _run(scenario)
+    plan = plan_of(scenario)
+    zones, trains = len(plan.world.radio.stations), len(scenario.trains)
+    channels = len({antenna.downlink_channel for antenna in plan.world.radio.stations})
+    transport = transport_ms(
+        zones, trains, channels, min(2, channels), scenario.ranging.samples, _FLOOR_TICKS
+    )
+    arithmetic = arithmetic_ms(scenario, plan, min(_FLOOR_TICKS, scenario.ticks))
+    return {
+        "name": name,
+        "unit": "x real time",
+        "ours": report["real_time_factor"],
+        "peer_name": "real time",
+        "peer": 1.0,
+        "ratio": report["real_time_factor"],
+        "bound": scenario.tick_s * 1e3 / (transport + arithmetic),
+        "transport_ms_per_tick": transport,
+        "arithmetic_ms_per_tick": arithmetic,
+    }
+
+
+def _run(scenario: Scenario) -> dict[str, Any]:
+    """Report of a run of its own, as a user starts it, in one process."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, report = Path(folder) / "scenario.yaml", Path(folder) / "report.json"
+        path.write_text(scenario.to_json())  # JSON is YAML
+        command = [sys.executable, "-m", "rail_corridor.cli", "run", str(path)]
+        subprocess.run(
+            [*command, "--processes", "one", "--report", str(report)],
+            check=True,
+            stdout=subprocess.DEVNULL,
+            timeout=1800,
+        )
+        return dict(json.loads(report.read_text()))
+
+
+if __name__ == "__main__":
+    for row in rows(tuple(sys.argv[1:])):
+        print(json.dumps(row))

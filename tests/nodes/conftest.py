@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
+import fcntl
 import os
+import tempfile
 from collections.abc import Callable, Iterator
-from typing import Any
+from pathlib import Path
+from typing import IO, Any
 
 import pytest
 import rclpy
@@ -22,24 +24,34 @@ from rail_msgs_py.topics import Topic
 
 #: Only ever reached by a test that fails.
 PATIENCE_S = 30.0
-#: Domains 70 to 100, apart for each worker of pytest-xdist.
-_FIRST_DOMAIN, _DOMAINS = 70, 31
-_started = itertools.count()
+#: Domains that tests share; one at a time has each.
+_DOMAINS = range(70, 101)
 
 
-def _domain() -> int:
-    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
-    return _FIRST_DOMAIN + (16 * int(worker) + next(_started)) % _DOMAINS
+def _claim_domain() -> tuple[int, IO[str]]:
+    """Return a domain that no other test on this machine is in, and the lock that keeps it."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    for step in range(len(_DOMAINS)):
+        domain = _DOMAINS[(worker * 7 + step) % len(_DOMAINS)]
+        lock = (Path(tempfile.gettempdir()) / f"rail_corridor_domain_{domain}.lock").open("w")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            lock.close()
+        else:
+            return domain, lock
+    raise RuntimeError("every domain is taken")
 
 
 class Graph:
     """Nodes under test, and a bystander that talks to them."""
 
     def __init__(self) -> None:
+        domain, self._lock = _claim_domain()
         self.context = rclpy.Context()
         rclpy.init(
             context=self.context,
-            domain_id=_domain(),
+            domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,
         )
         self.bystander = Node(
@@ -116,6 +128,7 @@ class Graph:
         for node in (*self._nodes, self.bystander):
             node.destroy_node()
         rclpy.try_shutdown(context=self.context)
+        self._lock.close()
 
     def _look(self) -> None:
         if not self._reached.done() and self._predicate():

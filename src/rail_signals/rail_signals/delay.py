@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rail_signals.phasors import cis
 from rail_signals.ranging_signal import ComplexArray
 
 
@@ -55,17 +56,10 @@ def _phase_ramp(delay_samples: np.ndarray, samples: int) -> ComplexArray:
     turn = -2 * math.pi * np.mod(delay_samples, samples)[..., None] / samples
     fine_count = math.isqrt(samples - 1) + 1
     coarse_count = -(-samples // fine_count)
-    fine = _cis(turn * np.arange(fine_count))
-    coarse = _cis(turn * (fine_count * np.arange(coarse_count)))
+    fine = cis(turn * np.arange(fine_count))
+    coarse = cis(turn * (fine_count * np.arange(coarse_count)))
     shape = (*turn.shape[:-1], coarse_count * fine_count)
     ramp = (coarse[..., :, None] * fine[..., None, :]).reshape(shape)[..., :samples]
     # Bins from the Nyquist frequency upwards are negative frequencies.
-    ramp[..., (samples + 1) // 2 :] *= _cis(-turn * samples)
+    ramp[..., (samples + 1) // 2 :] *= cis(-turn * samples)
     return ramp
-
-
-def _cis(angle: np.ndarray) -> ComplexArray:
-    out = np.empty(angle.shape, dtype=np.complex128)
-    np.cos(angle, out=out.real)
-    np.sin(angle, out=out.imag)
-    return out

@@ -1,34 +1,46 @@
 """Carrier offset of an FM ranging signal, and its removal.
 
-The lines of the wave share one offset and, over segments of whole periods, keep their
-phases. So the offset is where the lines of the segments, summed coherently over the burst
-and in power over the lines, peak.
+The lines of the wave share one offset and, over whole periods, keep their phases. So the
+offset is where the lines of the periods, summed coherently over the burst and in power
+over the lines, peak.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from rail_signals.line_spectrum import LineSpectrum
+from rail_signals.phasors import cis
 from rail_signals.ranging_signal import ComplexArray, FloatArray, RangingSignal
 
-Bursts: TypeAlias = NDArray[np.complex64] | NDArray[np.complex128]
+RealArray: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
+TAPER_LOSS = 1e-9
+"""Largest share of the power of an offset carrier that tapers may leave out."""
+
+MAX_TAPERS = 12
+"""Largest number of tapers; with more the sums take longer than they save."""
+
+_TAPERS_FROM = 64
 _SEGMENT_CYCLES = 0.25
-_FOLD_FROM = 12
 
 
 class OffsetSearch:
-    """Search for the offset on a grid of half a cycle per burst, and interpolation.
+    """Search for the offset on a grid of half a cycle per burst, and its removal.
+
+    Both work on rows of one period each: those of the burst, or weighted sums of them if
+    fewer than `MAX_TAPERS` do. The weights, `tapers`, are Slepian sequences (Slepian, Bell
+    System Technical Journal 57(5), 1978): the first of them hold every offset in the
+    interval but for `TAPER_LOSS`, so that nothing more is needed of the burst.
 
     Interpolation follows Aboutanios and Mulgrew (IEEE Trans. Signal Processing 53(4),
     2005), with all lines in one quotient: with ``R(+)``, ``R(-)`` the responses half a
     cycle per burst above and below and K segments, the remaining offset is
-    ``d = K / (pi T) atan(q tan(pi / 2K))``, ``q = Re sum (R(+) - R(-)) (R(+) + R(-))* /
+    ``d = K / (pi T) atan(q tan(pi / 2K))``, ``q = sum (|R(+)|^2 - |R(-)|^2) /
     sum |R(+) + R(-)|^2``, times being counted from the middle of the burst.
 
     Parameters
@@ -54,88 +66,130 @@ class OffsetSearch:
                 f"max_offset_hz must stay below {limit_hz:g} Hz for periods of"
                 f" {period} samples, got {max_offset_hz:g}"
             )
-        periods = signal.samples // period
-        repeats = _segment_periods(periods, max_offset_hz * period / rate_hz)
-        segments = periods // repeats
-        # Long segments are folded first. Of short ones each is one row of samples, and the
-        # basis repeats with the period: one product instead of many small ones.
-        long = repeats >= _FOLD_FROM
-        self._ones = np.ones((1, repeats)) if long else None
-        self._shape = (segments, repeats, 2 * period) if long else (segments, 2 * repeats * period)
-        # Real before imaginary parts, so that products with `_grid` stay real.
-        basis = lines.real_basis(period).reshape(2 * period, -1, 2).swapaxes(1, 2)
-        self._basis = np.tile(basis.reshape(2 * period, -1), (1 if long else repeats, 1))
+        self._period, self._periods = period, signal.samples // period
         step_hz = 0.5 / signal.duration_s
         half = math.ceil(max_offset_hz / step_hz) + 1
-        self._grid_hz = step_hz * np.arange(-half, half + 1)
-        centre_s = (np.arange(segments) - (segments - 1) / 2) * repeats * period / rate_hz
-        turn = 2 * math.pi * self._grid_hz[:, None] * centre_s
-        cos, sin = np.cos(turn), np.sin(turn)
-        grid = np.stack([np.stack([cos, sin], axis=-1), np.stack([-sin, cos], axis=-1)], axis=1)
-        self._grid = grid.reshape(2 * len(turn), 2 * segments)
-        self._single = (self._basis.astype(np.float32), self._grid.astype(np.float32))
-        self._line_count = len(lines.bins)
-        self._arc = math.tan(math.pi / (2 * segments))
-        self._arc_hz = segments / math.pi / signal.duration_s
-        # The time of a sample about the middle is a sum of four terms, so its phasor is
-        # a product of entries of four short tables.
-        fine = max(d for d in range(1, math.isqrt(period) + 1) if period % d == 0)
-        steps = (
-            (segments, repeats * period),
-            (repeats, period),
-            (period // fine, fine),
-            (fine, 1),
-        )
-        times = [(np.arange(count) - (count - 1) / 2) * step / rate_hz for count, step in steps]
-        self._ramp = -2 * math.pi * np.concatenate(times)
-        self._split = np.cumsum([count for count, _ in steps])[:3].tolist()
-        self._periods, self._period = periods, period
-
-    @property
-    def width_hz(self) -> float:
+        grid_hz = step_hz * np.arange(-half, half + 1, dtype=np.float64)
+        self.width_hz = 2 * half * step_hz
         """Width of the interval searched [Hz]."""
-        return float(self._grid_hz[-1] - self._grid_hz[0])
+        cycles_per_sample = grid_hz[-2] / rate_hz
+        self.tapers = _tapers(self._periods, cycles_per_sample * period)
+        """Weights [tapers, periods] of the sums to make; None if the burst is better."""
+        # Without sums, segments are several periods: the basis repeats with the period.
+        repeats = 1
+        if self.tapers is None:
+            repeats = _segment_periods(self._periods, max_offset_hz * period / rate_hz)
+        segments = self._periods // repeats
+        self._row = 2 * period * repeats
+        # Arrays, not numbers: these a ufunc takes without conversion.
+        self._arc = np.array(math.tan(math.pi / (2 * segments)))
+        self._arc_hz = np.array(segments / math.pi / signal.duration_s)
+        self._grid_hz = grid_hz[1:-1]
+        tables = _Tables.of(signal, lines, grid_hz, repeats, self.tapers)
+        self._tables: dict[Any, _Tables] = {
+            np.dtype(kind): tables.astype(kind) for kind in (np.float32, np.float64)
+        }
+        self._line_count, self._grid_count = len(lines.bins), len(grid_hz)
+        i, j = _factors(self._periods)
+        self._split = (i, i + j, i + j + _factors(period)[0])
 
-    def offset_hz(self, bursts: Bursts) -> FloatArray:
-        """Carrier offset [Hz] of each of `bursts` [batch, samples]."""
+    def offset_hz(self, rows: RealArray) -> FloatArray:
+        """Carrier offset [Hz] of each of `rows` [batch, rows, 2 period] (see `fold`)."""
         # Matrix products are stacked, one of fixed shape for each burst, so that their
         # rounding does not depend on the batch.
-        single = bursts.dtype == np.complex64
-        basis, grid = self._single if single else (self._basis, self._grid)
-        rows = bursts.view(basis.dtype).reshape(len(bursts), *self._shape)
-        if self._ones is not None:
-            rows = np.matmul(self._ones.astype(rows.dtype), rows)[:, :, 0]
-        lines = rows @ basis
-        count = self._line_count
-        response = grid @ lines.reshape(len(rows), 2 * self._shape[0], count)
-        response = response.reshape(len(rows), len(self._grid_hz), 2 * count)
-        peak = row_dot(response, response)[:, 1:-1].argmax(axis=-1) + 1
-        row = np.arange(len(rows))
-        above, below = response[row, peak + 1], response[row, peak - 1]
+        _, basis, grid, _ = self._tables[rows.dtype]
+        batch, _, width = rows.shape
+        if width != self._row:
+            rows = rows.reshape(batch, -1 if batch else 1, self._row)
+        lines = (rows @ basis).reshape(batch, grid.shape[1], self._line_count)
+        response = (grid @ lines).reshape(batch, self._grid_count, 2 * self._line_count)
+        power = np.vecdot(response, response)
+        below, above = response[:, :-2], response[:, 2:]
         total = above + below
-        quotient = row_dot(above - below, total) / row_dot(total, total)
-        return np.asarray(self._grid_hz[peak] + np.arctan(quotient * self._arc) * self._arc_hz)
+        quotient = (power[:, 2:] - power[:, :-2]) / np.vecdot(total, total)
+        offset_hz = np.arctan(quotient * self._arc) * self._arc_hz + self._grid_hz
+        peak = power[:, 1:-1].argmax(axis=1)
+        return np.asarray(offset_hz[np.arange(batch), peak], dtype=np.float64)
 
-    def fold(self, bursts: Bursts, offset_hz: FloatArray) -> ComplexArray:
-        """Sum of the periods [batch, period] after turning back by `offset_hz` [batch].
+    def fold(self, rows: RealArray, offset_hz: FloatArray) -> ComplexArray:
+        """Sum of the periods [batch, 1, period] after turning back by `offset_hz` [batch].
 
         The phase is turned about the middle of the burst.
+
+        Parameters
+        ----------
+        rows : float [batch, rows, 2 period]
+            The periods of each burst, or their sums weighted by `tapers`, as real and
+            imaginary parts.
+        offset_hz : float [batch]
+            Offset to remove [Hz].
         """
-        batch = len(bursts)
-        table = np.empty((batch, len(self._ramp)), dtype=bursts.dtype)
-        angle = (offset_hz[:, None] * self._ramp).astype(table.real.dtype, copy=False)
-        np.cos(angle, out=table.real)
-        np.sin(angle, out=table.imag)
+        tapers, _, _, ramp = self._tables[rows.dtype]
+        batch = len(rows)
+        turn = cis(offset_hz.astype(ramp.dtype)[:, None] * ramp)
         i, j, k = self._split
-        turn = (table[:, :i, None] * table[:, None, i:j]).reshape(batch, 1, self._periods)
-        within = (table[:, j:k, None] * table[:, None, k:]).reshape(batch, self._period)
-        within *= (turn @ bursts.reshape(batch, self._periods, self._period))[:, 0]
-        return within.astype(np.complex128, copy=False)
+        over: Any = turn[:, :i, None] * turn[:, None, i:j]
+        over = over.reshape(batch, 1, self._periods)
+        if tapers is not None:
+            over = over @ tapers
+        within = turn[:, j:k, None] * turn[:, None, k:]
+        folded = over @ rows.view(turn.dtype)
+        folded *= within.reshape(batch, 1, self._period)
+        return np.asarray(folded, dtype=np.complex128)
 
 
-def row_dot(left: NDArray[Any], right: NDArray[Any]) -> FloatArray:
-    """Inner product along the last axis."""
-    return np.asarray(np.vecdot(left, right), dtype=np.float64)
+class _Tables(NamedTuple):
+    """Matrices in the precision of the bursts."""
+
+    tapers: NDArray[Any] | None
+    basis: NDArray[Any]
+    grid: NDArray[Any]
+    ramp: NDArray[Any]
+
+    @classmethod
+    def of(
+        cls,
+        signal: RangingSignal,
+        lines: LineSpectrum,
+        grid_hz: FloatArray,
+        repeats: int,
+        tapers: FloatArray | None,
+    ) -> _Tables:
+        period = signal.period_samples
+        periods = signal.samples // period
+        # The time of a sample about the middle is a sum of four terms, so its phasor is
+        # a product of entries of four short tables.
+        i, j = _factors(periods)
+        k, m = _factors(period)
+        steps = ((i, j * period), (j, period), (k, m), (m, 1))
+        times = [(np.arange(count) - (count - 1) / 2) * step for count, step in steps]
+        per_hz = -2 * math.pi / signal.sample_rate_hz
+        segments = periods // repeats
+        centres = (np.arange(segments) - (segments - 1) / 2) * (repeats * period)
+        turn = cis(per_hz * np.outer(grid_hz, centres))
+        if tapers is not None:
+            turn = turn @ tapers.T
+        # Real before imaginary parts, so that products with the grid stay real.
+        basis = lines.real_basis(period).reshape(2 * period, -1, 2).swapaxes(1, 2)
+        re, im = turn.real, turn.imag
+        grid = np.stack([np.stack([re, -im], axis=-1), np.stack([im, re], axis=-1)], axis=1)
+        return cls(
+            None if tapers is None else tapers.T.astype(np.complex128),
+            np.tile(basis.reshape(2 * period, -1), (repeats, 1)),
+            grid.reshape(2 * len(grid_hz), -1),
+            per_hz * np.concatenate(times),
+        )
+
+    def astype(self, kind: DTypeLike) -> _Tables:
+        tapers, *rest = self
+        paired = None if tapers is None else tapers.astype(np.result_type(kind, np.complex64))
+        return _Tables(paired, *(np.ascontiguousarray(table, dtype=kind) for table in rest))
+
+
+def _factors(count: int) -> tuple[int, int]:
+    """Two factors of `count`, as close to each other as they come."""
+    low = max(d for d in range(1, math.isqrt(count) + 1) if count % d == 0)
+    return count // low, low
 
 
 def _segment_periods(periods: int, cycles_per_period: float) -> int:
@@ -146,3 +200,30 @@ def _segment_periods(periods: int, cycles_per_period: float) -> int:
         if periods % count == 0 and count * cycles_per_period <= _SEGMENT_CYCLES
     ]
     return max(fits, default=1)
+
+
+def _tapers(periods: int, cycles_per_period: float) -> FloatArray | None:
+    """Slepian sequences [sequences, periods], or None where they do not pay."""
+    if periods < _TAPERS_FROM:
+        return None
+    tapers = slepian_sequences(periods, cycles_per_period, TAPER_LOSS)
+    return tapers if len(tapers) <= MAX_TAPERS else None
+
+
+def slepian_sequences(count: int, cycles: float, loss: float) -> FloatArray:
+    """Orthonormal sequences [sequences, count] that hold all low-frequency sinusoids.
+
+    As few as leave out less than `loss` of the power of any sinusoid of up to `cycles`
+    cycles per element.
+
+    Examples
+    --------
+    >>> slepian_sequences(124, 1 / 124, 1e-9).shape
+    (8, 124)
+    """
+    index = np.arange(count)
+    _, vectors = np.linalg.eigh(np.sinc(2 * cycles * (index[:, None] - index)))
+    sequences = vectors.T[::-1]
+    tones = cis(2 * math.pi * np.outer(np.linspace(0, cycles, 2 * count), index))
+    held = np.cumsum(np.abs(tones @ sequences.T) ** 2, axis=1).min(axis=0) / count
+    return np.ascontiguousarray(sequences[: int(np.argmax(held > 1 - loss)) + 1])

@@ -101,6 +101,14 @@ def run(
             metavar="PART",
         ),
     ] = None,
+    external: Annotated[
+        Optional[list[str]],
+        typer.Option(
+            "--external",
+            help="Do not start this node but wait for yours of the same name; repeatable.",
+            metavar="NODE",
+        ),
+    ] = None,
     timeout: Annotated[
         float,
         typer.Option(
@@ -126,7 +134,9 @@ def run(
     from .launcher import RunOptions
     from .launcher import run as run_corridor
 
-    options = RunOptions(rate, processes, only, report, timeout)  # type: ignore[arg-type]
+    options = RunOptions(  # type: ignore[arg-type]
+        rate, processes, only, report, timeout, tuple(external or ())
+    )
     raise typer.Exit(run_corridor(loaded, options, Console()))  # type: ignore[arg-type]
 
 

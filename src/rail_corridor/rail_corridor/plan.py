@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import math
 from collections.abc import Iterable, Sequence
@@ -21,6 +22,7 @@ from rail_world.radio_description import (
 from rail_world.world_file import WorldFile
 
 from .calibration import Transponder, calibrate
+from .errors import InputError
 from .layout import Layout, Zone
 from .scenario import Scenario
 from .sections import DeadStation
@@ -65,7 +67,9 @@ class Plan:
     world: WorldFile
     transponders: dict[str, Transponder]
 
-    def groups(self, placement: Placement, only: Side | None = None) -> dict[str, list[NodeSpec]]:
+    def groups(
+        self, placement: Placement, only: Side | None = None, external: Iterable[str] = ()
+    ) -> dict[str, list[NodeSpec]]:
         """Nodes by process.
 
         Parameters
@@ -73,9 +77,13 @@ class Plan:
         placement : 'one', 'site' or 'node'
         only : 'wayside' or 'onboard', optional
             Part of the corridor that this host runs; the world is with the wayside.
+        external : iterable of str
+            Full names of nodes that somebody else runs; the corridor waits for them.
         """
+        others = set(external)
         sides = {None: None, "wayside": ("world", "wayside"), "onboard": ("onboard",)}[only]
         nodes = [spec for spec in self.nodes if sides is None or spec.side in sides]
+        nodes = [spec for spec in nodes if spec.name not in others]
         if placement == "one":
             return {"corridor": nodes}
         groups: dict[str, list[NodeSpec]] = {}
@@ -83,6 +91,18 @@ class Plan:
             key = spec.site if placement == "site" else spec.name.strip("/").replace("/", "_")
             groups.setdefault(key, []).append(spec)
         return _packed(groups)
+
+
+def check_external(plan: Plan, external: Iterable[str]) -> None:
+    """Raise InputError for a node that cannot be somebody else's."""
+    known = [spec.name for spec in plan.nodes if spec.name != WORLD]
+    for name in external:
+        if name in known:
+            continue
+        close = difflib.get_close_matches(name, known, n=1)
+        reason = "the corridor has no such node that could be replaced"
+        reason += f", did you mean {close[0]}" if close else ""
+        raise InputError(reason, field="--external", value=name)
 
 
 def _packed(groups: dict[str, list[NodeSpec]]) -> dict[str, list[NodeSpec]]:

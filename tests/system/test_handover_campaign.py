@@ -17,21 +17,21 @@ pytestmark = pytest.mark.system
 
 
 @pytest.mark.parametrize(
-    ("situation", "trains", "crossings"),
+    ("situation", "trains", "crossings", "options"),
     [
-        *((Situation(corridor, "running", 500.0), 2, 20) for corridor in CORRIDORS),
-        *((Situation(corridor, "standing", MANOEUVRE_KMH), 1, 3) for corridor in CORRIDORS),
-        *((Situation(corridor, "reversing", MANOEUVRE_KMH), 1, 6) for corridor in CORRIDORS),
+        *((Situation(corridor, "running", 500.0), 2, 20, ()) for corridor in CORRIDORS),
+        (Situation("plain", "standing", MANOEUVRE_KMH), 1, 2, ("--duration", 75)),
+        (Situation("branching", "reversing", MANOEUVRE_KMH), 1, 2, ("--duration", 75)),
     ],
     ids=lambda value: value.name if isinstance(value, Situation) else "",
 )
 def test_no_handover_is_missed_and_no_position_is_false(
-    rail: Rail, situation: Situation, trains: int, crossings: int
+    rail: Rail, situation: Situation, trains: int, crossings: int, options: tuple[object, ...]
 ) -> None:
     path = rail.directory / "run.yaml"
     path.write_text(json.dumps(scenario_data(situation, trains, seed=3)))
     row = Row(situation)
-    row.add(rail.report(path, "--processes", "one"))
+    row.add(rail.report(path, "--processes", "one", *options))
     assert row.crossings >= crossings
     assert row.made == row.crossings
     assert row.violations == 0

@@ -1,0 +1,72 @@
+"""Replace the zone controller by your own node: a straight line through the last five readings.
+
+Run:  rail run plain_line --external /wayside/zone_controller     (in another terminal)
+      python examples/own_estimator.py [SCENARIO]
+See:  the report of the other terminal, whose figures of the first train are those of this node.
+"""
+
+import sys
+import tempfile
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+
+from rail_corridor.middleware import discover_on
+from rail_corridor.plan import CONTROLLER, make_plan
+from rail_corridor.scenario import load_scenario
+from rail_msgs_py import topics
+from rail_msgs_py.headers import header_to_cdr
+from rail_msgs_py.inbox import TickInbox
+from rail_msgs_py.node import CorridorNode
+from rail_msgs_py.parameters import declare
+from rail_msgs_py.position import Position
+from rail_msgs_py.range_reading import RangeReading
+from rail_msgs_py.standalone import run_node
+from rail_wayside.zone_controller_node import ZoneControllerParameters, zone_map_of
+
+
+class LineFit(CorridorNode):
+    """Read every range; answer every tick with a position and `done`."""
+
+    def __init__(self, parameters: dict[str, object]) -> None:
+        super().__init__("zone_controller", "/wayside", parameters=parameters)
+        described = declare(self, ZoneControllerParameters)
+        self.train, self.zones = described.trains[0], zone_map_of(described).zones
+        self.inbox, self.last = TickInbox(self.zones), deque(maxlen=5)
+        for zone in self.zones.values():
+            self.stream_in(topics.RANGE, self.on_range, site=zone.site, zone=zone.name)
+        self.position = self.publisher(topics.POSITION, train=self.train)
+        self.done = self.stream_out(topics.DONE, node=self.get_fully_qualified_name())
+        self.announce_when_connected()
+
+    def on_range(self, raw: bytes) -> None:
+        """Wait for the readings of every zone."""
+        reading = RangeReading.from_cdr(raw)
+        self.inbox.put(reading.stamp_ns, reading.zone, reading)
+        while self.inbox.complete:
+            self.estimate(*self.inbox.take())
+
+    def estimate(self, stamp_ns: int, readings: dict[str, RangeReading]) -> None:
+        """Fit, publish, and say that the tick is done."""
+        usable = [(self.zones[name], r) for name, r in readings.items() if r.usable]
+        track, chainage_m, variance_m2, speed = "", 0.0, np.inf, 0.0
+        for zone, reading in usable[:1]:
+            track = zone.track
+            place = zone.locate(reading.range_m, reading.variance_m2)
+            self.last.append(place[0] if place else np.nan)
+            if len(self.last) == 5 and np.isfinite(self.last).all():
+                speed, chainage_m = np.polyfit(np.arange(-4, 1), self.last, 1)
+                variance_m2 = 0.6 * place[1]  # of the end of a line through five points
+        figures = (float(chainage_m), float(variance_m2), float(speed) * 10.0, np.inf)
+        self.position.publish(Position(stamp_ns, self.train, track, *figures).to_cdr())
+        self.done(header_to_cdr(stamp_ns))
+
+
+if __name__ == "__main__":
+    discover_on("this")
+    scenario = load_scenario(sys.argv[1] if len(sys.argv) > 1 else "plain_line")
+    with tempfile.TemporaryDirectory() as directory:
+        plan = make_plan(scenario, Path(directory))
+    spec = next(spec for spec in plan.nodes if spec.name == CONTROLLER)
+    run_node(lambda: LineFit(spec.parameters))

@@ -166,9 +166,7 @@ class CorridorNode(CorridorMixin, Node):  # type: ignore[misc]
         parameters: Mapping[str, Any] | None = None,
         services: bool = True,
     ) -> None:
-        super().__init__(
-            name, namespace=namespace, **node_arguments(context, parameters, services)
-        )
+        super().__init__(name, namespace=namespace, **node_arguments(context, parameters, services))
         self.init_corridor()
 
 

@@ -68,13 +68,13 @@ def declare(node: Any, kind: type[Parameters]) -> Parameters:
 
 def _declare_field(node: Any, field: dataclasses.Field[Any], hint: Any) -> Any:
     described = descriptor(field, hint)
+    default: Any = field.default
     if hint in _ARRAYS:
         value = node.declare_parameter(field.name, _ARRAYS[hint], described).value
         # An array parameter that nobody sets has no value: there is no typed empty default.
-        value = field.default if value is None else tuple(value)
-        numbers = value
+        value = numbers = tuple(default if value is None else value)
     else:
-        value = node.declare_parameter(field.name, hint(field.default), described).value
+        value = node.declare_parameter(field.name, hint(default), described).value
         numbers = (value,)
     for number in numbers:
         if isinstance(number, bool) or not isinstance(number, (int, float)):

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rail_signals.ranging_signal import RangingSignal
-
 from rail_msgs_py.parameters import parameter
+from rail_signals.ranging_signal import RangingSignal
 
 
 @dataclass(frozen=True)
@@ -19,9 +18,7 @@ class SignalParameters:
     deviations_hz: tuple[float, ...] = parameter(
         (375e3,), "peak frequency deviation of each tone", unit="Hz", low=1.0
     )
-    sample_rate_hz: float = parameter(
-        4e6, "complex sample rate", unit="Hz", low=1e3, high=1e9
-    )
+    sample_rate_hz: float = parameter(4e6, "complex sample rate", unit="Hz", low=1e3, high=1e9)
     samples: int = parameter(960, "samples of one burst", low=8, high=31250)
 
 

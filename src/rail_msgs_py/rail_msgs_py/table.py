@@ -96,9 +96,7 @@ class TableWriter:
 
     def write(self, stamp_ns: int, values: NDArray[np.float64]) -> bytes:
         """Serialised table; ``values`` [row, column] must be C-contiguous float64."""
-        return b"".join(
-            (self._prefix, struct.pack("<d", stamp_ns / NANOSECONDS), values.tobytes())
-        )
+        return b"".join((self._prefix, struct.pack("<d", stamp_ns / NANOSECONDS), values.tobytes()))
 
     @property
     def data_at(self) -> int:

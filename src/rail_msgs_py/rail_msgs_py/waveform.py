@@ -60,7 +60,7 @@ class Waveform:
     @property
     def silent(self) -> bool:
         """Whether the block carries no sample."""
-        return self.samples.shape[1] == 0
+        return self.samples.size == 0
 
     @property
     def power_dbm(self) -> float:

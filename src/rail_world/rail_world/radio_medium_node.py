@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 from rail_msgs_py import topics
 from rail_msgs_py.failures import FailureWatch
 from rail_msgs_py.headers import header_to_cdr
@@ -20,7 +21,6 @@ from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter, figures_from_cdr
 from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
-
 from rail_world.radio import Paths, RadioMedium, Reception, TrainAntennas
 from rail_world.world_file import read_world_file
 

@@ -90,3 +90,22 @@ def test_two_tones_reach_both_bounds() -> None:
             error = (found.phase_lag_rad - lag)[found.detected, tone]
             bound = tone_phase_variance_bound(10 ** (db / 10), 960, signal.indices[tone])
             assert 0.95 <= rms_turn(error) / math.sqrt(float(bound)) <= 1.05
+
+
+def test_sums_of_periods_lose_nothing() -> None:
+    """Up to a cycle of offset in a burst, a few weighted sums stand for all its periods."""
+    rng = np.random.default_rng(23)
+    receiver = LineReceiver(SIGNAL, max_offset_hz=1e3)
+    lag = rng.uniform(0, 2 * math.pi, (1000, 1))
+    offset_hz = rng.uniform(-1e3, 1e3, 1000)
+    offset_hz[:2] = -1e3, 1e3
+    t = np.arange(SIGNAL.samples) / SIGNAL.sample_rate_hz
+    wave = modulate(SIGNAL, lag) * np.exp(2j * math.pi * offset_hz[:, None] * t)
+    clean = receiver.estimate(wave)
+    assert rms_turn(clean.phase_lag_rad - lag) < 1e-5
+    np.testing.assert_allclose(clean.frequency_offset_hz, offset_hz, atol=0.05)
+    assert (clean.snr > 1e8).all()
+    found = receiver.estimate(wave + noise(rng, wave.shape) * 10**0.5)
+    bound = float(tone_phase_variance_bound(0.1, SIGNAL.samples, 1.0))
+    assert 0.95 <= rms_turn(found.phase_lag_rad - lag) / math.sqrt(bound) <= 1.05
+    assert found.snr.mean() == pytest.approx(0.1, rel=0.03)

@@ -32,7 +32,7 @@ MAX_SNR_SINGLE = 1e6
 """The same for bursts in single precision (60 dB), where rounding begins to matter."""
 
 _STRONG_SHARE = 0.92
-_CHUNK_BYTES = 3 << 19
+_CHUNK_BYTES = 3 << 18
 
 
 @dataclass(frozen=True)

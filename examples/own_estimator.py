@@ -49,24 +49,22 @@ class LineFit(CorridorNode):
 
     def estimate(self, stamp_ns: int, readings: dict[str, RangeReading]) -> None:
         """Fit, publish, and say that the tick is done."""
+        track, figures = "", (0.0, np.inf, 0.0, np.inf)  # chainage, its variance, speed, its own
         usable = [(self.zones[name], r) for name, r in readings.items() if r.usable]
-        track, chainage_m, variance_m2, speed = "", 0.0, np.inf, 0.0
         for zone, reading in usable[:1]:
-            track = zone.track
-            place = zone.locate(reading.range_m, reading.variance_m2)
-            self.last.append(place[0] if place else np.nan)
-            if len(self.last) == 5 and np.isfinite(self.last).all():
-                speed, chainage_m = np.polyfit(np.arange(-4, 1), self.last, 1)
-                variance_m2 = 0.6 * place[1]  # of the end of a line through five points
-        figures = (float(chainage_m), float(variance_m2), float(speed) * 10.0, np.inf)
+            chainage_m, variance_m2 = zone.locate(reading.range_m, reading.variance_m2)
+            self.last.append(chainage_m)
+            if len(self.last) == 5:
+                per_tick_m, now_m = np.polyfit(np.arange(-4, 1), self.last, 1)
+                # 0.6: variance of the end of a line through five points.
+                track, figures = zone.track, (now_m, 0.6 * variance_m2, per_tick_m / 0.1, np.inf)
         self.position.publish(Position(stamp_ns, self.train, track, *figures).to_cdr())
         self.done(header_to_cdr(stamp_ns))
 
 
 if __name__ == "__main__":
     discover_on("this")
-    scenario = load_scenario(sys.argv[1] if len(sys.argv) > 1 else "plain_line")
     with tempfile.TemporaryDirectory() as directory:
-        plan = make_plan(scenario, Path(directory))
-    spec = next(spec for spec in plan.nodes if spec.name == CONTROLLER)
+        plan = make_plan(load_scenario((sys.argv[1:] or ["plain_line"])[0]), Path(directory))
+    (spec,) = (spec for spec in plan.nodes if spec.name == CONTROLLER)
     run_node(lambda: LineFit(spec.parameters))

@@ -13,6 +13,7 @@ import tempfile
 from pathlib import Path
 
 HOSTS = (f"rail{os.getpid()}w", f"rail{os.getpid()}o")
+OWN_MEMORY = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs none /dev/shm && exec "$@"', "-")
 
 
 def ip(*arguments: str) -> None:
@@ -36,21 +37,14 @@ def make_hosts() -> None:
 def main(scenario: str = "branch", seconds: str = "10") -> int:
     """Run the scenario on two hosts, then on one, and compare."""
     run = [sys.executable, "-m", "rail_corridor.cli", "run", scenario, "--duration", seconds]
-    own_memory = [
-        "unshare",
-        "--mount",
-        "sh",
-        "-c",
-        'mount -t tmpfs none /dev/shm && exec "$@"',
-        "-",
-    ]
+    wide = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     with tempfile.TemporaryDirectory() as directory:
         reports = [Path(directory, name) for name in ("two.json", "one.json")]
         try:
             make_hosts()
             parts = [["--only", "onboard"], ["--only", "wayside", "--report", str(reports[0])]]
             hosts = [
-                subprocess.Popen(["ip", "netns", "exec", host, *own_memory, *run, *part])
+                subprocess.Popen(["ip", "netns", "exec", host, *OWN_MEMORY, *run, *part], env=wide)
                 for host, part in zip(reversed(HOSTS), parts, strict=True)
             ]
             codes = [host.wait() for host in hosts]

@@ -16,7 +16,7 @@ from rail_msgs_py import topics
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.position import Position
 from rail_msgs_py.range_reading import RangeReading
-from rail_msgs_py.stamps import to_ns
+from rail_msgs_py.stamps import clock_to_cdr, to_ns
 from rail_wayside.zone_controller_node import ZoneControllerNode
 
 TICK_NS = 100_000_000
@@ -35,13 +35,15 @@ class Controller:
             zone: graph.sender(topics.RANGE, site=site, zone=zone)
             for zone, site in self.places.items()
         }
+        self._clock = graph.sender(topics.CLOCK)
         self.positions = graph.mailbox(topics.POSITION, train="train_a")
         self.done = graph.mailbox(topics.DONE, raw=True, node=CONTROLLER)
         graph.add(ZoneControllerNode(context=graph.context, parameters=given))
         graph.connect(CONTROLLER)
 
     def read(self, tick: int, ranges_m: dict[str, float], missing: tuple[str, ...] = ()) -> None:
-        """Send the readings of a tick; zones that are not named hear nothing."""
+        """Send clock and readings of a tick; zones that are not named hear nothing."""
+        self._clock(clock_to_cdr(tick * TICK_NS))
         for zone, send in self._send.items():
             if zone not in missing:
                 range_m = ranges_m.get(zone, math.inf)
@@ -105,6 +107,15 @@ def test_a_station_that_does_not_answer_is_named_and_the_tick_goes_on(
     controller.read(2, {"zone1": distance_m(154.0)})
     assert controller.position(3).known
     assert len(graph.failed) == 1
+
+
+def test_a_line_whose_stations_are_all_gone_still_has_ticks(graph: Any, plan: Plan) -> None:
+    controller = Controller(graph, plan, timeout_s=0.05)
+    everything = tuple(controller.places)
+    for tick in range(3):
+        controller.read(tick, {}, missing=everything)
+        assert not controller.position(tick + 1).known
+    assert len(graph.failed) == len(set(controller.places.values()))
 
 
 def test_the_order_of_the_readings_does_not_matter(graph: Any, plan: Plan) -> None:

@@ -178,6 +178,7 @@ WRONG: list[tuple[str, object, str, str]] = [
     ("trains.0.start_m", 1200, "trains.0.start_m", "off the route"),
     ("trains.0.start_m", -5, "trains.0.start_m", "greater than or equal"),
     ("trains.0.start_m", 151, "trains.1.start_m", "t1 is in the same place"),
+    ("trains.0.start_m", 20, "trains.1.start_m", "cannot be told apart"),
     ("trains.0.speed_kmh", 200, "trains.0.speed_kmh", "permitted"),
     ("trains.0.direction", 0, "trains.0.direction", "1 or -1"),
     ("trains.0.vehicle", {"mass_kg": 0}, "trains.0.vehicle.mass_kg", "greater than or equal"),

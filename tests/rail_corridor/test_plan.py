@@ -38,7 +38,7 @@ def test_every_station_train_and_the_rest_is_a_node(tmp_path: Path) -> None:
     (world,) = (spec for spec in plan.nodes if spec.name == WORLD)
     assert set(world.parameters["nodes"]) == set(names) - {WORLD}
     assert world.parameters["sinks"] == (MEDIUM, CONTROLLER)
-    assert world.parameters["clock_readers"] == 9
+    assert world.parameters["clock_readers"] == 10
 
 
 def test_timeouts_fall_so_that_the_nearest_to_the_fault_notices_first(tmp_path: Path) -> None:

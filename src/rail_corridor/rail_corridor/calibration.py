@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.line_receiver import LineReceiver
 from rail_signals.ranging_signal import RangingSignal, modulate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 # One thread for linear algebra: two cores are shared by many nodes, and the bits of a sum must
 # not depend on how many threads computed it. Has to be set before NumPy is loaded.
@@ -24,20 +24,20 @@ ScenarioArgument = Annotated[
     str, typer.Argument(help="Name of a built-in scenario, or a YAML file.", metavar="SCENARIO")
 ]
 SeedOption = Annotated[
-    Optional[int], typer.Option("--seed", help="Seed of every random draw.", metavar="N")
+    int | None, typer.Option("--seed", help="Seed of every random draw.", metavar="N")
 ]
 DurationOption = Annotated[
-    Optional[float], typer.Option("--duration", help="Simulated time [s].", metavar="S")
+    float | None, typer.Option("--duration", help="Simulated time [s].", metavar="S")
 ]
 TrackOption = Annotated[
-    Optional[Path],
+    Path | None,
     typer.Option("--track", help="TTOBench file that replaces the first track.", metavar="FILE"),
 ]
 TrainsOption = Annotated[
-    Optional[int], typer.Option("--trains", help="Number of trains.", metavar="N")
+    int | None, typer.Option("--trains", help="Number of trains.", metavar="N")
 ]
 ZoneOption = Annotated[
-    Optional[float],
+    float | None,
     typer.Option("--zone-length", help="No zone longer than this [m].", metavar="M"),
 ]
 
@@ -79,7 +79,7 @@ def run(
     ] = 0.0,
     seed: SeedOption = None,
     processes: Annotated[
-        Optional[str],
+        str | None,
         typer.Option(
             "--processes",
             help="one process, one per site and train, or one per node: one, site, node.",
@@ -90,11 +90,11 @@ def run(
     trains: TrainsOption = None,
     zone_length: ZoneOption = None,
     report: Annotated[
-        Optional[Path],
+        Path | None,
         typer.Option("--report", help="Write the report as JSON.", metavar="FILE.json"),
     ] = None,
     only: Annotated[
-        Optional[str],
+        str | None,
         typer.Option(
             "--only",
             help="Run one part here, the other on another host: wayside, onboard.",
@@ -102,7 +102,7 @@ def run(
         ),
     ] = None,
     external: Annotated[
-        Optional[list[str]],
+        list[str] | None,
         typer.Option(
             "--external",
             help="Do not start this node but wait for yours of the same name; repeatable.",
@@ -211,10 +211,10 @@ def hz(
 @app.command()
 def bench(
     names: Annotated[
-        Optional[list[str]], typer.Argument(help="Rows to run; all if none.", metavar="NAME...")
+        list[str] | None, typer.Argument(help="Rows to run; all if none.", metavar="NAME...")
     ] = None,
     json: Annotated[
-        Optional[Path], typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
+        Path | None, typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
     ] = None,
 ) -> None:
     """Run the benchmarks: every ratio is measured side by side in one run."""
@@ -233,7 +233,7 @@ def campaign(
     ] = 200,
     seed: Annotated[int, typer.Option("--seed", help="Seed of the first run.", metavar="N")] = 1,
     json: Annotated[
-        Optional[Path], typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
+        Path | None, typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
     ] = None,
 ) -> None:
     """Run many generated scenarios and count what must not happen; exit code 1 if it did."""

@@ -50,8 +50,9 @@ def make_node(spec: NodeSpec, context: Any, services: bool) -> Any:
 def run_nodes(specs: Iterable[NodeSpec]) -> None:
     """Make nodes in this process and spin them until SIGTERM."""
     import rclpy
-    from rail_msgs_py.standalone import spin
     from rclpy.signals import SignalHandlerOptions
+
+    from rail_msgs_py.standalone import spin
 
     specs = list(specs)
     context = rclpy.Context()

@@ -48,7 +48,13 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
     discover_on("all" if options.only else "this")
     directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
     try:
-        plan = make_plan(scenario, directory, rate=options.rate, timeout_s=options.timeout_s)
+        plan = make_plan(
+            scenario,
+            directory,
+            rate=options.rate,
+            timeout_s=options.timeout_s,
+            external=options.external,
+        )
         check_external(plan, options.external)
         return _Run(scenario, options, plan, console).run()
     finally:

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
+from std_msgs.msg import Header
+
 from rail_msgs_py import topics
 from rail_msgs_py.failures import failure
 from rail_msgs_py.node import CorridorNode
@@ -15,7 +17,6 @@ from rail_msgs_py.position import figures_from_cdr as position_from_cdr
 from rail_msgs_py.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.stamps import to_ns
 from rail_msgs_py.table import figures_from_cdr
-from std_msgs.msg import Header
 
 from .plan import Plan
 from .recording import Recording

@@ -126,6 +126,7 @@ def make_plan(
     rate: float = 0.0,
     observed: bool = True,
     timeout_s: float = 5.0,
+    external: Iterable[str] = (),
 ) -> Plan:
     """Plan a run; writes the world file into ``run_directory``."""
     layout = scenario.layout
@@ -159,7 +160,9 @@ def make_plan(
         "rate": float(rate),
         "nodes": tuple(spec.name for spec in others),
         "sinks": (MEDIUM, CONTROLLER),
-        "clock_readers": len(layout.stations),
+        "clock_readers": len(
+            {CONTROLLER, *(spec.name for spec in equipment if spec.kind == "wrs")} - {*external}
+        ),
         "observed": observed,
         "end_when_arrived": scenario.end_when_arrived,
         "timeout_s": timeout_s,

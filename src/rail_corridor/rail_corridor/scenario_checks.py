@@ -59,6 +59,7 @@ def check_scenario(scenario: Scenario, train_fields: Sequence[str]) -> None:
                 found.reason, field=f"{field}.{place}", value=found.value, file=found.file
             ) from None
     _check_places_of_trains(scenario.trains, train_fields)
+    _check_first_zones(scenario, layout, train_fields)
     _check_faults(scenario, layout)
 
 
@@ -139,6 +140,23 @@ def _check_places_of_trains(trains: Sequence[TrainDescription], fields: Sequence
                     field=f"{fields[index]}.start_m",
                     value=train.start_m,
                 )
+
+
+def _check_first_zones(scenario: Scenario, layout: Layout, fields: Sequence[str]) -> None:
+    """No two trains may stand in one zone at the start: nothing could ever tell which is which."""
+    owners: dict[str, TrainDescription] = {}
+    for train, field in zip(scenario.trains, fields, strict=True):
+        if train.enters_at_departure:
+            continue
+        zone = layout.zone_at(train.route[0], train.start_m).name
+        if zone in owners:
+            raise InputError(
+                f"in {zone} like {owners[zone].name}: two trains that start in one zone cannot"
+                " be told apart",
+                field=f"{field}.start_m",
+                value=train.start_m,
+            )
+        owners[zone] = train
 
 
 def _presence(train: TrainDescription) -> tuple[float, float]:

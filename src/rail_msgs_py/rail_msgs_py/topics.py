@@ -63,7 +63,9 @@ class Topic:
         return re.fullmatch(expression, name) is not None
 
 
-CLOCK: Final = Topic("/clock", Clock, STREAM, None, "world", "wrs", "Start of a tick.")
+CLOCK: Final = Topic(
+    "/clock", Clock, STREAM, None, "world", "wrs, zone_controller", "Start of a tick."
+)
 STATE: Final = Topic(
     "/world/state",
     Float64MultiArray,

@@ -1,6 +1,6 @@
 """Zone controller: turns the ranges of all stations into positions of all trains.
 
-Topics in: every ``range``. Topics out: ``~/<train>/position``, ``~/done``.
+Topics in: ``/clock``, every ``range``. Topics out: ``~/<train>/position``, ``~/done``.
 """
 
 from __future__ import annotations
@@ -20,11 +20,13 @@ from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.parameters import ParameterError, declare, parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.range_reading import RangeReading
+from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.standalone import run_node
 from rail_wayside.zone_map import Zone, ZoneMap
 from rail_wayside.zone_tracking import Fix, Reading, ZoneTracker
 
 WATCH_PERIOD_S = 0.1
+_CLOCK_PORT = "clock"
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,8 @@ class ZoneControllerNode(CorridorNode):
         }
         self._writers: dict[tuple[str, str], PositionWriter] = {}
         owners = {zone.name: f"/wayside/{zone.site}" for zone in zone_map.zones.values()}
-        self._inbox: TickInbox[RangeReading] = TickInbox(owners)
+        # The clock is a port like the others: a tick ends though no station answers.
+        self._inbox: TickInbox[RangeReading | None] = TickInbox([*owners, _CLOCK_PORT])
         self._watch = FailureWatch(self, owners, self._drop)
         self._waiting_since_s = float("inf")
         for zone in zone_map.zones.values():
@@ -115,14 +118,18 @@ class ZoneControllerNode(CorridorNode):
                 site=zone.site,
                 zone=zone.name,
             )
+        self.stream_in(topics.CLOCK, self._on_clock)
         self._done = self.stream_out(topics.DONE, node=self.get_fully_qualified_name())
         self.every(WATCH_PERIOD_S, self._check)
         self.announce_when_connected()
 
+    def _on_clock(self, raw: bytes) -> None:
+        self._inbox.put(clock_from_cdr(raw), _CLOCK_PORT, None)
+        self._waiting_since_s = self.steady_s()
+        self._advance()
+
     def _on_range(self, zone: str, raw: bytes) -> None:
         reading = RangeReading.from_cdr(raw)
-        if self._waiting_since_s == float("inf"):
-            self._waiting_since_s = self.steady_s()
         self._inbox.put(reading.stamp_ns, zone, reading)
         self._advance()
 
@@ -135,7 +142,11 @@ class ZoneControllerNode(CorridorNode):
         self._waiting_since_s = float("inf")
         fixes = self._tracker.update(
             stamp_ns * 1e-9,
-            {zone: Reading(r.range_m, r.variance_m2) for zone, r in readings.items()},
+            {
+                zone: Reading(reading.range_m, reading.variance_m2)
+                for zone, reading in readings.items()
+                if reading is not None
+            },
         )
         for fix in fixes:
             self._publish(stamp_ns, fix)
@@ -171,7 +182,8 @@ class ZoneControllerNode(CorridorNode):
     def _check(self) -> None:
         waited_s = self.steady_s() - self._waiting_since_s
         if waited_s > self._p.timeout_s:
-            self._watch.give_up(self._inbox.missing, self._p.timeout_s)
+            overdue = [port for port in self._inbox.missing if port != _CLOCK_PORT]
+            self._watch.give_up(overdue, self._p.timeout_s)
 
     def _drop(self, zones: tuple[str, ...]) -> None:
         self._inbox.drop(zones)

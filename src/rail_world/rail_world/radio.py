@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.delay import fractional_delay
 from rail_signals.phasors import cis, rotation
-
 from rail_world.noise import NoiseSource
 from rail_world.radio_description import AntennaPattern, RadioDescription
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_world.train_description import TrainDescription
 from rail_world.motion import TrainMotion
 from rail_world.network import Network
 from rail_world.route import Route
+from rail_world.train_description import TrainDescription
 
 STEP_M = 0.25
 MOST_POINTS = 400_000

@@ -7,9 +7,9 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field
 
 from rail_world.description import JunctionDescription, TrackDescription
-from rail_world.train_description import TrainDescription
 from rail_world.network import Network, build_network
 from rail_world.radio_description import RadioDescription
+from rail_world.train_description import TrainDescription
 
 
 class WorldFile(BaseModel):

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from std_msgs.msg import Header
+
 from rail_msgs_py import topics
 from rail_msgs_py.failures import FailureWatch
 from rail_msgs_py.inbox import TickInbox
@@ -22,8 +24,6 @@ from rail_msgs_py.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
-from std_msgs.msg import Header
-
 from rail_world.corridor_map import markers, path_of
 from rail_world.traffic import Traffic
 from rail_world.world_file import read_world_file

@@ -29,13 +29,18 @@ _TOKEN = "RAIL_TEST_TOKEN"
 _domains = itertools.count(os.getpid())
 
 
-def wait_until(condition: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
-    """Return the first true value of a condition; fail after a long time."""
-    deadline_s = time.monotonic() + patience_s
-    while not (value := condition()):
-        assert time.monotonic() < deadline_s, f"waited {patience_s} s in vain"
-        time.sleep(0.01)
-    return value
+@pytest.fixture
+def wait_until() -> Callable[[Callable[[], Any]], Any]:
+    """Return a function that waits for a condition and returns early; it fails after long."""
+
+    def wait(condition: Callable[[], Any]) -> Any:
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not (value := condition()):
+            assert time.monotonic() < deadline_s, f"waited {PATIENCE_S} s in vain"
+            time.sleep(0.01)
+        return value
+
+    return wait
 
 
 def _segments_of(processes: Iterable[int]) -> set[Path]:
@@ -167,7 +172,9 @@ class Listener:
         return value
 
     def close(self) -> None:
-        """End the node."""
+        """End the node; what the corridor shares with it is then its own again."""
+        if not self.context.ok():
+            return
         self._executor.shutdown()
         self.node.destroy_node()
         rclpy.try_shutdown(context=self.context)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import signal
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -25,6 +26,7 @@ def test_a_signal_ends_everything_and_leaves_a_report(
     run = rail.start("run", "branch", "--rate", 5, "--processes", "site", "--report", path)
     listener.until(lambda: len(clock) > 10)
     segments = rail.segments()
+    listener.close()
     run.send_signal(number)
     assert rail.finish(run) == 128 + number
     report = json.loads(path.read_text())
@@ -37,15 +39,18 @@ def test_a_signal_ends_everything_and_leaves_a_report(
     assert "Traceback" not in rail.errors(run)
 
 
-def test_nothing_outlives_a_killed_launcher(rail: Rail, listener: Listener) -> None:
+def test_nothing_outlives_a_killed_launcher(
+    rail: Rail, listener: Listener, wait_until: Callable[[Callable[[], Any]], Any]
+) -> None:
     clock = listener.listen(topics.CLOCK)
     run = rail.start("run", "branch", "--rate", 5, "--processes", "site")
     listener.until(lambda: len(clock) > 10)
     assert len(rail.processes()) > 5
     segments = rail.segments()
+    listener.close()
     run.kill()
     run.wait()
-    listener.until(lambda: not rail.processes())
+    wait_until(lambda: not rail.processes())
     assert segments
     assert not rail.left_behind(segments)
 

@@ -68,13 +68,23 @@ class ProcessGroup:
             work()
             code = 0
             if select.select([self._read_end], [], [], 0.0)[0]:
-                remove_orphaned_segments()  # the launcher is gone, and with it who tidies up
+                self._tidy_up_in_place_of_the_launcher()
         except BaseException:
             traceback.print_exc()
         finally:
             sys.stdout.flush()
             sys.stderr.flush()
             os._exit(code)
+
+    def _tidy_up_in_place_of_the_launcher(self) -> None:
+        """In a child whose launcher was killed: wait for older siblings, remove what is left.
+
+        Every child does so, so that the youngest alive, at least, comes after all others.
+        """
+        deadline_s = time.monotonic() + GRACE_S
+        while any(_runs(child.pid) for child in self.children) and time.monotonic() < deadline_s:
+            time.sleep(_POLL_S)
+        remove_orphaned_segments(besides=os.getpid())
 
     def poll(self) -> list[Child]:
         """Children that have ended since the last call."""
@@ -120,7 +130,7 @@ def _how(status: int) -> str:
 
 
 def remove_orphaned_segments(
-    directory: Path = Path("/dev/shm"), proc: Path = Path("/proc")
+    directory: Path = Path("/dev/shm"), proc: Path = Path("/proc"), besides: int | None = None
 ) -> list[Path]:
     """Remove shared-memory segments of the middleware that no process has any longer.
 
@@ -155,6 +165,13 @@ def _in_use(process: Path, directory: Path) -> set[str]:
                 if target.startswith(start):
                     names.add(target[len(start) :].removesuffix(" (deleted)"))
     return names
+
+
+def _runs(pid: int) -> bool:
+    """Whether a process has memory, which a zombie has not."""
+    with contextlib.suppress(OSError):
+        return bool(Path(f"/proc/{pid}/maps").read_text())
+    return False
 
 
 def _mine(path: Path) -> bool:

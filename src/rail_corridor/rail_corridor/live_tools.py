@@ -16,7 +16,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rich.console import Console
-from rich.table import Table
 
 from rail_msgs_py import topics
 from rail_msgs_py.stamps import to_ns
@@ -26,7 +25,9 @@ from .decoded import decode, raw_text
 from .middleware import discover_on
 
 #: Wall time for discovery to show what is there.
-DISCOVERY_S = 8.0
+DISCOVERY_S = 15.0
+#: ... and without anything new for this long, that is all.
+SETTLED_S = 2.0
 _POLL_S = 0.05
 _WINDOW = 200
 
@@ -75,19 +76,22 @@ def list_topics() -> int:
             if len(known) != settled["count"]:
                 settled.update(count=len(known), since=time.monotonic())
             found = any(topics.kind_of(name) for name in known)
-            return found and time.monotonic() - settled["since"] > 0.5
+            return found and time.monotonic() - settled["since"] > SETTLED_S
 
         if not _when(node, is_settled, DISCOVERY_S):
             console.print("no corridor is running on this host and ROS_DOMAIN_ID")
             return 1
-    table = Table()
-    for heading in ("topic", "type", "what it carries"):
-        table.add_column(heading, overflow="fold")
-    for name, types in sorted(known.items()):
-        kind = topics.kind_of(name)
-        if kind is not None:
-            table.add_row(name, ", ".join(types), kind.text)
-    console.print(table)
+    rows = [
+        (name, ", ".join(types), kind.text)
+        for name, types in sorted(known.items())
+        if (kind := topics.kind_of(name)) is not None
+    ]
+    # One line each, whatever the width of the terminal: for grep as well as for the eye.
+    wide = [max(len(row[column]) for row in rows) for column in range(2)]
+    for name, types, text in rows:
+        console.print(
+            f"{name:{wide[0]}}  {types:{wide[1]}}  {text}", soft_wrap=True, highlight=False
+        )
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import tempfile
@@ -106,7 +107,7 @@ class _Run:
             self._watch()
         finally:
             self._processes.stop()
-            remove_orphaned_segments()
+            remove_orphaned_segments(besides=os.getpid())  # ROS is shut down here by now
             for number, handler in previous.items():
                 signal.signal(number, handler)
         return self._finish(nodes)

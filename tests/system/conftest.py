@@ -44,13 +44,14 @@ def wait_until() -> Callable[[Callable[[], Any]], Any]:
 
 
 def _segments_of(processes: Iterable[int]) -> set[Path]:
+    """Return the segments of participants; those of ports are shared with other domains."""
     found = set()
     for pid in processes:
         try:
             maps = Path(f"/proc/{pid}/maps").read_text()
         except OSError:
             continue
-        found |= {Path(name) for name in re.findall(r"/dev/shm/fastrtps_\w+", maps)}
+        found |= {Path(name) for name in re.findall(r"/dev/shm/fastrtps_[0-9a-f]{16}\b", maps)}
     return found
 
 

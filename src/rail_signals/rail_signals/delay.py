@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from functools import cache
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.fft import fft, ifft
 
-from rail_signals.phasors import cis
-from rail_signals.ranging_signal import ComplexArray
+from rail_signals.phasors import cis, rotation
+from rail_signals.ranging_signal import ComplexArray, FloatArray
 
 
 def fractional_delay(blocks: ArrayLike, delay_s: ArrayLike, sample_rate_hz: float) -> ComplexArray:
@@ -48,18 +51,70 @@ def fractional_delay(blocks: ArrayLike, delay_s: ArrayLike, sample_rate_hz: floa
     return np.fft.ifft(np.fft.fft(x) * ramp)
 
 
-def _phase_ramp(delay_samples: np.ndarray, samples: int) -> ComplexArray:
-    """``exp(-j 2 pi k d / N)`` over the signed bin numbers k in transform order.
+def through_paths(
+    blocks: ArrayLike,
+    sender: NDArray[np.intp],
+    *,
+    delay_s: FloatArray,
+    shift_hz: FloatArray,
+    gain: ComplexArray,
+    sample_rate_hz: float,
+) -> NDArray[np.complex64]:
+    """What arrives over many paths at once: delayed as by `fractional_delay`, shifted, scaled.
+
+    In single precision, whose rounding lies 140 dB below the signal.
+
+    Parameters
+    ----------
+    blocks : complex [sender, samples]
+        What is sent.
+    sender : int [path]
+        Which block each path carries.
+    delay_s, shift_hz : float [path]
+        Delay [s] and frequency shift [Hz]; the shift leaves the phase at mid-block alone.
+    gain : complex [path]
+        Amplitude and carrier phase.
+    sample_rate_hz
+        Complex sample rate [Hz].
+
+    Returns
+    -------
+    complex64 [path, samples]
+    """
+    x = np.asarray(blocks, dtype=np.complex64)
+    samples = x.shape[-1]
+    spectra = fft(x, overwrite_x=True)[sender]
+    spectra *= _phase_ramp(delay_s * sample_rate_hz, samples, gain, np.complex64)
+    arrived: NDArray[np.complex64] = ifft(spectra, overwrite_x=True)
+    arrived *= rotation(shift_hz / sample_rate_hz, samples, np.complex64)
+    return arrived
+
+
+def _phase_ramp(
+    delay_samples: FloatArray,
+    samples: int,
+    gain: ComplexArray | None = None,
+    dtype: Any = np.complex128,
+) -> ComplexArray:
+    """``gain exp(-j 2 pi k d / N)`` over the signed bin numbers k in transform order.
 
     Two short tables and their outer product replace N complex exponentials.
     """
     turn = -2 * math.pi * np.mod(delay_samples, samples)[..., None] / samples
-    fine_count = math.isqrt(samples - 1) + 1
-    coarse_count = -(-samples // fine_count)
-    fine = cis(turn * np.arange(fine_count))
-    coarse = cis(turn * (fine_count * np.arange(coarse_count)))
-    shape = (*turn.shape[:-1], coarse_count * fine_count)
-    ramp = (coarse[..., :, None] * fine[..., None, :]).reshape(shape)[..., :samples]
-    # Bins from the Nyquist frequency upwards are negative frequencies.
-    ramp[..., (samples + 1) // 2 :] *= cis(-turn * samples)
-    return ramp
+    fine_count = _fine_count(samples)
+    first = np.fft.fftfreq(samples, 1 / samples)[::fine_count]
+    fine = cis(turn * np.arange(fine_count)).astype(dtype)
+    coarse = cis(turn * first)
+    if gain is not None:
+        coarse *= gain[..., None]
+    shape = (*turn.shape[:-1], samples)
+    return np.asarray((coarse.astype(dtype)[..., :, None] * fine[..., None, :]).reshape(shape))
+
+
+@cache
+def _fine_count(samples: int) -> int:
+    """Length of the fine table: about the root, and the negative bins begin a coarse step."""
+    if samples % 2:
+        return 1
+    half = samples // 2
+    return max(d for d in range(1, math.isqrt(samples) + 1) if half % d == 0)

@@ -11,7 +11,11 @@ from numpy.typing import ArrayLike
 from rail_signals.ranging_signal import ComplexArray
 
 
-def rotation(cycles_per_sample: ArrayLike, samples: int) -> ComplexArray:
+def rotation(
+    cycles_per_sample: ArrayLike,
+    samples: int,
+    dtype: Any = np.complex128,
+) -> ComplexArray:
     """Rotations ``exp(j 2 pi c (n - (samples - 1) / 2))``, without phase at mid-burst.
 
     Parameters
@@ -20,10 +24,12 @@ def rotation(cycles_per_sample: ArrayLike, samples: int) -> ComplexArray:
         Frequencies c as fractions of the sample rate.
     samples
         Samples n in a row.
+    dtype
+        Of the result; the tables are made in double precision.
 
     Returns
     -------
-    complex128 [..., samples]
+    complex [..., samples]
 
     Examples
     --------
@@ -33,11 +39,12 @@ def rotation(cycles_per_sample: ArrayLike, samples: int) -> ComplexArray:
     turn = 2.0 * math.pi * np.asarray(cycles_per_sample, dtype=np.float64)[..., None]
     fine_count = math.isqrt(samples - 1) + 1
     coarse_count = -(-samples // fine_count)
-    fine = cis(turn * np.arange(fine_count))
+    fine = cis(turn * np.arange(fine_count)).astype(dtype, copy=False)
     start = fine_count * np.arange(coarse_count) - (samples - 1) / 2
-    coarse = cis(turn * start)
+    coarse = cis(turn * start).astype(dtype, copy=False)
     shape = (*turn.shape[:-1], coarse_count * fine_count)
-    return (coarse[..., :, None] * fine[..., None, :]).reshape(shape)[..., :samples]
+    rows: ComplexArray = (coarse[..., :, None] * fine[..., None, :]).reshape(shape)
+    return rows[..., :samples]
 
 
 def cis(angle_rad: ArrayLike) -> ComplexArray:

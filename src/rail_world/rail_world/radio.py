@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.delay import fractional_delay
-from rail_signals.phasors import cis, rotation
+from rail_signals.delay import through_paths
+from rail_signals.phasors import cis
 from rail_world.noise import NoiseSource
 from rail_world.radio_description import AntennaPattern, RadioDescription
 
@@ -61,7 +61,7 @@ class Reception:
     ``source`` (station antenna, train); ``noise_mw`` of thermal noise and jammers.
     """
 
-    samples: ComplexArray
+    samples: NDArray[np.complex64]
     signal_mw: float
     noise_mw: float
     source: tuple[int, int]
@@ -105,10 +105,14 @@ class RadioMedium:
         by_site = {site: sigma * rng.standard_normal() for site in dict.fromkeys(self._sites)}
         self._station_offset = np.array([by_site[site] for site in self._sites])
         self._train_offset = sigma * rng.standard_normal(len(description.trains))
-        self._loss_at_1m_db = {
-            channel: 20.0 * np.log10(4.0 * np.pi * hz / SPEED_OF_LIGHT_M_PER_S)
-            for channel, hz in description.carriers_hz.items()
-        }
+        # By channel number, so that arrays of channels can index them.
+        self._carrier_hz = np.zeros(1 + max(description.carriers_hz, default=0))
+        for channel, carrier_hz in description.carriers_hz.items():
+            self._carrier_hz[channel] = carrier_hz
+        with np.errstate(divide="ignore"):
+            self._loss_at_1m_db = 20.0 * np.log10(
+                4.0 * np.pi * self._carrier_hz / SPEED_OF_LIGHT_M_PER_S
+            )
         self.noise_mw = 10.0 ** (
             (THERMAL_NOISE_DBM_PER_HZ + description.noise_figure_db) / 10.0
         ) * (description.sample_rate_hz)
@@ -161,13 +165,10 @@ class RadioMedium:
         -------
         dict of (train index, channel) -> Reception; pairs that hear nothing are missing.
         """
-        dead = self.dead_stations(time_s)
-        sources: dict[tuple[int, int], list[tuple[int, int]]] = {}
-        for station in sorted(blocks.keys() - dead):
-            channel = int(self._downlink[station])
-            for train in np.flatnonzero(paths.in_reach[station]):
-                sources.setdefault((int(train), channel), []).append((station, int(train)))
-        return self._receive(tick, time_s, 1, paths, sources, blocks, uplink=False)
+        sending = self._alive(time_s)
+        sending[[station for station in range(len(sending)) if station not in blocks]] = False
+        links = np.nonzero(paths.in_reach & sending[:, None])
+        return self._receive(tick, time_s, paths, links, blocks, self._downlink[links[0]])
 
     def uplink(
         self,
@@ -181,74 +182,77 @@ class RadioMedium:
         ``blocks``: train index -> (channel, samples sent).
         Returns a dict of (station antenna index, channel) -> Reception.
         """
-        dead = self.dead_stations(time_s)
-        sources: dict[tuple[int, int], list[tuple[int, int]]] = {}
-        for train in sorted(blocks):
-            channel = blocks[train][0]
-            hears = paths.in_reach[:, train] & (self._uplink == channel)
-            for station in np.flatnonzero(hears):
-                if int(station) not in dead:
-                    key = (int(station), channel)
-                    sources.setdefault(key, []).append((int(station), train))
+        channel = np.zeros(paths.in_reach.shape[1], dtype=np.int64)
+        for train, (on, _) in blocks.items():
+            channel[train] = on
+        hears = (self._uplink[:, None] == channel) & self._alive(time_s)[:, None]
+        links = np.nonzero(paths.in_reach & hears)
         sent = {train: samples for train, (_, samples) in blocks.items()}
-        return self._receive(tick, time_s, 2, paths, sources, sent, uplink=True)
+        return self._receive(tick, time_s, paths, links, sent, self._uplink[links[0]], uplink=True)
+
+    def _alive(self, time_s: float) -> NDArray[np.bool_]:
+        """Which station antennas are not dead."""
+        alive = np.ones(len(self._sites), dtype=np.bool_)
+        alive[list(self.dead_stations(time_s))] = False
+        return alive
 
     def _receive(
         self,
         tick: int,
         time_s: float,
-        stage: int,
         paths: Paths,
-        sources: dict[tuple[int, int], list[tuple[int, int]]],
+        links: tuple[NDArray[np.intp], ...],
         blocks: dict[int, ComplexArray],
+        channel: NDArray[np.int64],
         *,
-        uplink: bool,
+        uplink: bool = False,
     ) -> dict[tuple[int, int], Reception]:
-        radio = self.description
-        links: list[tuple[tuple[int, int], int, int, int]] = []
-        for port, pairs in sources.items():
-            for station, train in pairs:
-                sender = train if uplink else station
-                links.append((port, station, train, sender))
+        """Carry ``blocks`` over the links (station, train), each on its channel; add noise."""
         received: dict[tuple[int, int], Reception] = {}
-        if not links:
+        if not blocks or not links[0].size:
             return received
-        channels = [port[1] for port, *_ in links]
-        carrier_hz = np.array([radio.carriers_hz[channel] for channel in channels])
-        loss_db = np.array([self._loss_at_1m_db[channel] for channel in channels])
-        s = np.array([station for _, station, *_ in links])
-        t = np.array([train for _, _, train, _ in links])
-        sent = np.stack([blocks[sender] for *_, sender in links])
-        gain_db = paths.gain_db[s, t] - loss_db
-        sent_mw = np.einsum("ln,ln->l", sent, sent.conj()).real / sent.shape[1]
-        power_mw = sent_mw * 10.0 ** (gain_db / 10.0)
-        audible = power_mw >= self._floor_mw
-        if not audible.any():
+        radio = self.description
+        senders = sorted(blocks)
+        sent = np.stack([blocks[sender] for sender in senders])
+        row_of = np.searchsorted(senders, links[1 if uplink else 0])
+        gain_db = paths.gain_db[links] - self._loss_at_1m_db[channel]
+        power_mw = (np.vecdot(sent, sent).real / sent.shape[1])[row_of] * 10.0 ** (gain_db / 10.0)
+        audible = np.flatnonzero(power_mw >= self._floor_mw)
+        if not audible.size:
             return received
+        s, t = links[0][audible], links[1][audible]
+        power_mw, channel = power_mw[audible], channel[audible]
+        carrier_hz = self._carrier_hz[channel]
         delay_s = paths.distance_m[s, t] / SPEED_OF_LIGHT_M_PER_S
         doppler_hz = carrier_hz * paths.closing_speed_mps[s, t] / SPEED_OF_LIGHT_M_PER_S
         offsets = self._station_offset[s] - self._train_offset[t]
-        shift_hz = doppler_hz + carrier_hz * (-offsets if uplink else offsets)
-        amplitude = 10.0 ** (gain_db / 20.0)
         carrier_phase = -2.0 * np.pi * np.mod(carrier_hz * delay_s, 1.0)
-        keep = np.flatnonzero(audible)
-        arrived = fractional_delay(sent[keep], delay_s[keep], radio.sample_rate_hz)
-        arrived *= rotation(shift_hz[keep] / radio.sample_rate_hz, sent.shape[1])
-        arrived *= (amplitude[keep] * cis(carrier_phase[keep]))[:, None]
+        arrived = through_paths(
+            sent,
+            row_of[audible],
+            delay_s=delay_s,
+            shift_hz=doppler_hz + carrier_hz * (-offsets if uplink else offsets),
+            gain=10.0 ** (gain_db[audible] / 20.0) * cis(carrier_phase),
+            sample_rate_hz=radio.sample_rate_hz,
+        )
         heard: dict[tuple[int, int], list[int]] = {}
-        for row, link in enumerate(keep):
-            heard.setdefault(links[link][0], []).append(row)
+        receivers = (s if uplink else t).tolist()
+        for row, port in enumerate(zip(receivers, channel.tolist(), strict=True)):
+            heard.setdefault(port, []).append(row)
         for port, rows in heard.items():
             total = arrived[rows[0]]
             for row in rows[1:]:
                 total += arrived[row]
-            strongest = max((keep[row] for row in rows), key=lambda link: power_mw[link])
+            strongest = max(rows, key=lambda row: float(power_mw[row]))
             noise_mw = self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
-            noise = self._noise.block(stage, port[0] * 128 + port[1], tick)
+            noise = self._noise.block(2 if uplink else 1, port[0] * 128 + port[1], tick)
             noise *= np.float32(np.sqrt(noise_mw))
             total += noise
             received[port] = Reception(
-                total, float(power_mw[strongest]), noise_mw, links[strongest][1:3]
+                total,
+                float(power_mw[strongest]),
+                noise_mw,
+                (int(s[strongest]), int(t[strongest])),
             )
         return received
 
@@ -272,7 +276,7 @@ class RadioMedium:
             line = np.asarray(fault.position_m) - here
             distance_m = max(float(np.sqrt(line @ line)), _MIN_DISTANCE_M)
             gain_db = float(pattern_gain_db(pattern, line @ axis / distance_m))
-            loss_db = self._loss_at_1m_db[port[1]] + 10.0 * (
+            loss_db = float(self._loss_at_1m_db[port[1]]) + 10.0 * (
                 radio.path_loss_exponent * np.log10(distance_m)
             )
             total += 10.0 ** ((fault.power_dbm + gain_db - loss_db) / 10.0)

@@ -99,7 +99,9 @@ def run_campaign(
             made = row.crossings
             row.add(_run(scenario_data(situation, trains, seed + row.runs)))
             console.print(
-                f"{situation.name}: {row.crossings} crossings in {row.runs} runs", style="dim"
+                f"{situation.name}: {row.crossings} crossings in {row.runs} runs, "
+                f"{row.violations} violations",
+                style="dim",
             )
             if row.crossings == made:
                 raise RunFailedError(f"{situation.name}: no train crossed a station")

@@ -247,12 +247,16 @@ def campaign(
 
     from rich.console import Console
 
-    from .campaign import RunFailedError, print_rows, run_campaign, write_rows
+    from .campaign import Row, RunFailedError, print_rows, run_campaign, write_rows
     from .campaign_scenarios import situations
 
     console = Console()
+    rows: list[Row] = []
     try:
-        rows = list(run_campaign(situations(), crossings, seed, console))
+        rows.extend(run_campaign(situations(), crossings, seed, console))
+    except KeyboardInterrupt:
+        print_rows(rows, console)  # what is done is worth seeing
+        raise
     except RunFailedError as error:
         print(f"rail: {error}", file=sys.stderr)
         raise typer.Exit(1) from None

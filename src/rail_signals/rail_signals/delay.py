@@ -51,9 +51,13 @@ def fractional_delay(blocks: ArrayLike, delay_s: ArrayLike, sample_rate_hz: floa
     return np.fft.ifft(np.fft.fft(x) * ramp)
 
 
+def spectra_of(blocks: ArrayLike) -> NDArray[np.complex64]:
+    """Spectra [..., samples] of blocks, for `through_paths`."""
+    return np.asarray(fft(np.asarray(blocks, dtype=np.complex64)))
+
+
 def through_paths(
-    blocks: ArrayLike,
-    sender: NDArray[np.intp],
+    spectra: NDArray[np.complex64],
     *,
     delay_s: FloatArray,
     shift_hz: FloatArray,
@@ -66,10 +70,8 @@ def through_paths(
 
     Parameters
     ----------
-    blocks : complex [sender, samples]
-        What is sent.
-    sender : int [path]
-        Which block each path carries.
+    spectra : complex64 [path, samples]
+        What each path carries, as from `spectra_of`; overwritten.
     delay_s, shift_hz : float [path]
         Delay [s] and frequency shift [Hz]; the shift leaves the phase at mid-block alone.
     gain : complex [path]
@@ -81,9 +83,7 @@ def through_paths(
     -------
     complex64 [path, samples]
     """
-    x = np.asarray(blocks, dtype=np.complex64)
-    samples = x.shape[-1]
-    spectra = fft(x, overwrite_x=True)[sender]
+    samples = spectra.shape[-1]
     spectra *= _phase_ramp(delay_s * sample_rate_hz, samples, gain, np.complex64)
     arrived: NDArray[np.complex64] = ifft(spectra, overwrite_x=True)
     arrived *= rotation(shift_hz / sample_rate_hz, samples, np.complex64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,18 +33,23 @@ class NoiseSource:
         self._state = self._bits.state
         self._samples = samples
 
-    def block(self, stage: int, port: int, tick: int) -> NDArray[np.complex64]:
-        """Noise [sample] with a mean power of 1."""
-        state = self._state
-        state["state"]["counter"][:] = (0, stage, port, tick)
-        state["buffer_pos"] = 4
-        self._bits.state = state
-        words = self._bits.random_raw(self._samples).view(np.uint32).astype(np.float32)
-        first, second = words[: self._samples], words[self._samples :]
+    def blocks(self, stage: int, ports: Sequence[int], tick: int) -> NDArray[np.complex64]:
+        """Noise [port, sample] with a mean power of 1."""
+        state, samples = self._state, self._samples
+        words = np.empty((len(ports), samples), dtype=np.uint64)
+        for row, port in zip(words, ports, strict=True):
+            state["state"]["counter"][:] = (0, stage, port, tick)
+            state["buffer_pos"] = 4
+            self._bits.state = state
+            row[:] = self._bits.random_raw(samples)
+        halves = words.view(np.uint32).astype(np.float32)
         # From (0, 2^32]: a logarithm of zero would be infinite.
-        radius = np.sqrt(-np.log((first + np.float32(0.5)) * _WORD))
-        angle = second * _TURN
-        noise = np.empty(self._samples, dtype=np.complex64)
+        radius = halves[:, :samples]
+        radius += np.float32(0.5)
+        radius *= _WORD
+        radius = np.sqrt(-np.log(radius))
+        angle = halves[:, samples:] * _TURN
+        noise = np.empty(words.shape, dtype=np.complex64)
         np.multiply(radius, np.cos(angle), out=noise.real)
         np.multiply(radius, np.sin(angle), out=noise.imag)
         return noise

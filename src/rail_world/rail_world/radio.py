@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.delay import through_paths
+from rail_signals.delay import spectra_of, through_paths
 from rail_signals.phasors import cis
 from rail_world.noise import NoiseSource
 from rail_world.radio_description import AntennaPattern, RadioDescription
@@ -51,6 +51,15 @@ class Paths:
     in_reach: NDArray[np.bool_]
     train_position_m: FloatArray
     train_axis: FloatArray
+
+
+@dataclass(frozen=True)
+class _Sent:
+    """A block that an antenna sends, its mean power and its spectrum."""
+
+    samples: ComplexArray
+    power_mw: float
+    spectrum: NDArray[np.complex64]
 
 
 @dataclass(frozen=True)
@@ -118,6 +127,7 @@ class RadioMedium:
         ) * (description.sample_rate_hz)
         self._floor_mw = self.noise_mw * 10.0 ** (description.sensitivity_db / 10.0)
         self._noise = NoiseSource(seed, description.samples)
+        self._known: dict[tuple[bool, int], _Sent] = {}
 
     def paths(self, trains: TrainAntennas) -> Paths:
         """Distances, closing speeds and antenna gains of one tick."""
@@ -160,6 +170,7 @@ class RadioMedium:
         paths : Paths
         blocks : dict
             Index of the station antenna -> samples sent, sqrt(mW); silent ones are missing.
+            An array that is passed again is taken to hold the same samples.
 
         Returns
         -------
@@ -212,11 +223,10 @@ class RadioMedium:
         if not blocks or not links[0].size:
             return received
         radio = self.description
-        senders = sorted(blocks)
-        sent = np.stack([blocks[sender] for sender in senders])
-        row_of = np.searchsorted(senders, links[1 if uplink else 0])
+        sent_by = links[1 if uplink else 0].tolist()
+        sent = [self._sent(uplink, sender, blocks[sender]) for sender in sent_by]
         gain_db = paths.gain_db[links] - self._loss_at_1m_db[channel]
-        power_mw = (np.vecdot(sent, sent).real / sent.shape[1])[row_of] * 10.0 ** (gain_db / 10.0)
+        power_mw = np.array([block.power_mw for block in sent]) * 10.0 ** (gain_db / 10.0)
         audible = np.flatnonzero(power_mw >= self._floor_mw)
         if not audible.size:
             return received
@@ -228,8 +238,7 @@ class RadioMedium:
         offsets = self._station_offset[s] - self._train_offset[t]
         carrier_phase = -2.0 * np.pi * np.mod(carrier_hz * delay_s, 1.0)
         arrived = through_paths(
-            sent,
-            row_of[audible],
+            np.stack([sent[link].spectrum for link in audible]),
             delay_s=delay_s,
             shift_hz=doppler_hz + carrier_hz * (-offsets if uplink else offsets),
             gain=10.0 ** (gain_db[audible] / 20.0) * cis(carrier_phase),
@@ -239,15 +248,14 @@ class RadioMedium:
         receivers = (s if uplink else t).tolist()
         for row, port in enumerate(zip(receivers, channel.tolist(), strict=True)):
             heard.setdefault(port, []).append(row)
-        for port, rows in heard.items():
-            total = arrived[rows[0]]
-            for row in rows[1:]:
+        ports = [port[0] * 128 + port[1] for port in heard]
+        noise = self._noise.blocks(2 if uplink else 1, ports, tick)
+        for (port, rows), total in zip(heard.items(), noise, strict=True):
+            noise_mw = self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
+            total *= np.float32(np.sqrt(noise_mw))
+            for row in rows:
                 total += arrived[row]
             strongest = max(rows, key=lambda row: float(power_mw[row]))
-            noise_mw = self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
-            noise = self._noise.block(2 if uplink else 1, port[0] * 128 + port[1], tick)
-            noise *= np.float32(np.sqrt(noise_mw))
-            total += noise
             received[port] = Reception(
                 total,
                 float(power_mw[strongest]),
@@ -255,6 +263,15 @@ class RadioMedium:
                 (int(s[strongest]), int(t[strongest])),
             )
         return received
+
+    def _sent(self, uplink: bool, sender: int, samples: ComplexArray) -> _Sent:
+        """Power and spectrum of a block; a block that is sent again is not transformed again."""
+        known = self._known.get((uplink, sender))
+        if known is None or known.samples is not samples:
+            power_mw = float(np.vecdot(samples, samples).real) / len(samples)
+            known = _Sent(samples, power_mw, spectra_of(samples))
+            self._known[uplink, sender] = known
+        return known
 
     def _jamming_mw(
         self, time_s: float, port: tuple[int, int], paths: Paths, *, uplink: bool

@@ -20,7 +20,7 @@ from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter, figures_from_cdr
-from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
+from rail_msgs_py.waveform import BlockReader, RepeatedBlock, Waveform, silence
 from rail_world.radio import Paths, RadioMedium, Reception, TrainAntennas
 from rail_world.world_file import read_world_file
 
@@ -97,6 +97,8 @@ class RadioMediumNode(CorridorNode):
             channel: RepeatedBlock(silence(0, radio.sample_rate_hz, carrier_hz, channel))
             for channel, carrier_hz in radio.carriers_hz.items()
         }
+        self._readers = {port: BlockReader() for port in owners if port != _STATE_PORT}
+        self._rows: dict[str, tuple[Any, Any]] = {}
         self._paths: Paths | None = None
         self._heard: dict[tuple[int, int], Reception] = {}
         self._stage_begun_s = float("inf")
@@ -104,8 +106,13 @@ class RadioMediumNode(CorridorNode):
         self.announce_when_connected()
 
     def _put(self, inbox: TickInbox[Any], port: str, raw: bytes) -> None:
-        block = Waveform.from_cdr(raw)
-        inbox.put(block.stamp_ns, port, block)
+        block = self._readers[port].read(raw)
+        # One row of samples, the same object if the block is: the medium knows it by that.
+        rows = self._rows.get(port)
+        if rows is None or rows[0] is not block.samples:
+            rows = block.samples, None if block.silent else block.samples[0]
+            self._rows[port] = rows
+        inbox.put(block.stamp_ns, port, (block.channel, rows[1]))
         self._advance()
 
     def _on_state(self, raw: bytes) -> None:
@@ -126,9 +133,9 @@ class RadioMediumNode(CorridorNode):
             return
         self._paths = self._medium.paths(antennas_of(state))
         blocks = {
-            index: items[port].samples[0]
+            index: items[port][1]
             for index, port in enumerate(self._station_ports)
-            if port in items and not items[port].silent
+            if port in items and items[port][1] is not None
         }
         tick, time_s = stamp_ns // self._tick_ns, stamp_ns * 1e-9
         self._heard = self._medium.downlink(tick, time_s, self._paths, blocks)
@@ -141,9 +148,9 @@ class RadioMediumNode(CorridorNode):
     def _deliver_uplink(self, stamp_ns: int, items: dict[str, Any]) -> None:
         assert self._paths is not None
         blocks = {
-            index: (items[port].channel, items[port].samples[0])
+            index: items[port]
             for index, port in enumerate(self._train_ports)
-            if port in items and not items[port].silent
+            if port in items and items[port][1] is not None
         }
         tick, time_s = stamp_ns // self._tick_ns, stamp_ns * 1e-9
         heard = self._medium.uplink(tick, time_s, self._paths, blocks)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rail_corridor.launcher import default_placement
 from rail_corridor.plan import (
     CONTROLLER,
     MEDIUM,
@@ -68,6 +69,13 @@ def test_no_more_processes_than_can_find_each_other(tmp_path: Path, placement: P
     placed = [spec.name for specs in groups.values() for spec in specs]
     assert sorted(placed) == sorted(spec.name for spec in plan.nodes)
     assert len(set(groups)) == len(groups)
+
+
+def test_few_cores_get_one_process_and_many_get_one_per_site(tmp_path: Path) -> None:
+    plan = make_plan(load_scenario("demo"), tmp_path)
+    assert default_placement(plan, cores=2) == "one"
+    assert default_placement(plan, cores=8) == "site"
+    assert default_placement(make_plan(load_scenario("plain_line"), tmp_path), cores=2) == "site"
 
 
 def test_wayside_and_onboard_are_the_whole_corridor(tmp_path: Path) -> None:

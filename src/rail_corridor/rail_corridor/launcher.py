@@ -20,8 +20,8 @@ from .processes import ProcessGroup, remove_orphaned_segments
 from .report import make_report, print_report, write_report
 from .scenario import Scenario
 
-#: Above this many sites a process for each costs more than it shows.
-MOST_SITES_APART = 24
+#: More processes than this to a core cost more than they show.
+MOST_PROCESSES_PER_CORE = 8
 #: Wall time to read what is still under way when the world has finished.
 DRAIN_S = 5.0
 
@@ -62,9 +62,10 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
         shutil.rmtree(directory, ignore_errors=True)
 
 
-def default_placement(plan: Plan) -> Placement:
-    """A process per site and train, unless they are so many that one process is faster."""
-    return "site" if len(plan.groups("node")) <= MOST_SITES_APART else "one"
+def default_placement(plan: Plan, cores: int | None = None) -> Placement:
+    """A process per site and train, unless they are too many for the cores: then one is faster."""
+    most = MOST_PROCESSES_PER_CORE * (cores or os.cpu_count() or 1)
+    return "site" if len({spec.site for spec in plan.nodes}) <= most else "one"
 
 
 class _Run:

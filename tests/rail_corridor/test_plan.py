@@ -18,11 +18,10 @@ from rail_corridor.plan import (
     Placement,
     Plan,
     make_plan,
-    reach_m,
-    survey,
     write_nodes,
 )
 from rail_corridor.scenario import Overrides, load_scenario
+from rail_corridor.world_plan import reach_m, survey
 from rail_world.world_file import read_world_file
 
 

@@ -111,7 +111,10 @@ def test_what_the_report_reads_outlasts_the_window_it_may_lag() -> None:
 def test_what_late_joiners_must_learn_is_latched() -> None:
     latched = (topics.READY, topics.FAILED, topics.FINISHED, topics.CORRIDOR_PATH)
     assert all(t.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for t in latched)
-    assert STREAM.durability == ESTIMATE.durability == DurabilityPolicy.VOLATILE
+    assert STREAM.durability == DurabilityPolicy.VOLATILE
+    # a report that is connected after the first tick still gets it
+    assert ESTIMATE.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    assert topics.OBSERVED.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
     # one message of each node at least, and every part of the map
     assert LATCHED.depth >= 100
 

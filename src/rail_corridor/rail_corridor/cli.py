@@ -114,7 +114,7 @@ def run(
         typer.Option(
             "--timeout", help="Wall time after which a silent node is given up [s].", metavar="S"
         ),
-    ] = 5.0,
+    ] = 30.0,
 ) -> None:
     """Run a corridor, and report."""
     import math

@@ -23,7 +23,7 @@ from .scenario import Scenario
 #: More processes than this to a core cost more than they show.
 MOST_PROCESSES_PER_CORE = 8
 #: Wall time to read what is still under way when the world has finished.
-DRAIN_S = 5.0
+DRAIN_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class RunOptions:
     placement: Placement | None = None
     only: Literal["wayside", "onboard"] | None = None
     report: Path | None = None
-    timeout_s: float = 5.0
+    timeout_s: float = 30.0
     external: tuple[str, ...] = ()
 
 

@@ -18,6 +18,7 @@ from rclpy.task import Future
 from rich.console import Console
 
 from rail_msgs_py import topics
+from rail_msgs_py.qos import LATCHED
 from rail_msgs_py.stamps import to_ns
 from rail_msgs_py.standalone import spin
 
@@ -25,7 +26,7 @@ from .decoded import decode, raw_text
 from .middleware import discover_on
 
 #: Wall time for discovery to show what is there.
-DISCOVERY_S = 15.0
+DISCOVERY_S = 30.0
 #: ... and without anything new for this long, that is all.
 SETTLED_S = 2.0
 _POLL_S = 0.05
@@ -112,7 +113,10 @@ def _find(node: Node, topic: str) -> Any:
 def _like_publisher(node: Node, topic: str) -> QoSProfile:
     """Profile that every publisher of a topic is compatible with, latched if it is."""
     offers = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
-    latched = offers and all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
+    kind = topics.kind_of(topic)
+    # Of estimates only the present is wanted, though their past is kept.
+    latched = kind is None or kind.qos is LATCHED
+    latched &= all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
     reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
     return QoSProfile(
         depth=100,

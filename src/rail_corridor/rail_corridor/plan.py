@@ -117,7 +117,7 @@ def make_plan(
     *,
     rate: float = 0.0,
     observed: bool = True,
-    timeout_s: float = 5.0,
+    timeout_s: float = 30.0,
     external: Iterable[str] = (),
 ) -> Plan:
     """Plan a run; writes the world file into ``run_directory``."""

@@ -24,12 +24,13 @@ STREAM: Final = QoSProfile(
     durability=DurabilityPolicy.VOLATILE,
 )
 
-#: Estimates and truth, once a tick: also read by the report, which may lag by the window.
+#: Estimates and truth, once a tick: also read by the report, which may lag by the window, and
+#: may be connected later than the first tick: what it has missed is kept for it.
 ESTIMATE: Final = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=2 * OBSERVER_WINDOW_TICKS,
     reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 
 #: State that late joiners must learn: the last messages of each publisher are kept for them.

@@ -134,7 +134,7 @@ DONE: Final = Topic(
 OBSERVED: Final = Topic(
     "/report/observed",
     Header,
-    STREAM,
+    LATCHED,
     None,
     "the report",
     "world",

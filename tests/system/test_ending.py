@@ -24,7 +24,7 @@ def test_a_signal_ends_everything_and_leaves_a_report(
     path = rail.directory / "report.json"
     clock = listener.listen(topics.CLOCK)
     run = rail.start("run", "branch", "--rate", 5, "--processes", "site", "--report", path)
-    listener.until(lambda: len(clock) > 10)
+    listener.until(lambda: len(clock) > 30)
     run.send_signal(number)
     assert rail.finish(run) == 128 + number
     report = json.loads(path.read_text())

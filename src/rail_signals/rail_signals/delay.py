@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import fft, ifft
+from scipy.fft import fft
 
 from rail_signals.phasors import cis, rotation
 from rail_signals.ranging_signal import ComplexArray, FloatArray
@@ -85,7 +85,8 @@ def through_paths(
     """
     samples = spectra.shape[-1]
     spectra *= _phase_ramp(delay_s * sample_rate_hz, samples, gain, np.complex64)
-    arrived: NDArray[np.complex64] = ifft(spectra, overwrite_x=True)
+    # In double precision, where a row does not depend on the others that are transformed with it.
+    arrived = np.fft.ifft(spectra.astype(np.complex128)).astype(np.complex64)
     arrived *= rotation(shift_hz / sample_rate_hz, samples, np.complex64)
     return arrived
 

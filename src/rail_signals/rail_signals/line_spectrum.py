@@ -91,7 +91,7 @@ def line_spectrum(signal: RangingSignal) -> LineSpectrum:
     orders = np.stack(np.meshgrid(*[order] * tones, indexing="ij"), axis=-1).reshape(-1, tones)
     amplitudes = np.ones(len(orders))
     for i, beta in enumerate(signal.indices):
-        amplitudes = amplitudes * jv(orders[:, i], beta)
+        amplitudes *= np.asarray(jv(orders[:, i], beta), dtype=np.float64)
     bins = (orders @ np.array(signal.cycles_per_period)) % signal.period_samples
     power = amplitudes**2
     keep = np.zeros(len(orders), dtype=np.bool_)

@@ -142,7 +142,8 @@ class RangingSignal:
         power = np.ones(1)
         for f, beta in zip(self.tones_hz, self.indices, strict=True):
             frequency = (frequency[:, None] + f * order).ravel()
-            power = (power[:, None] * jv(order, beta) ** 2).ravel()
+            lines = np.asarray(jv(order, beta), dtype=np.float64)
+            power = (power[:, None] * lines**2).ravel()
         return float(power[np.abs(frequency) >= self.sample_rate_hz / 2].sum())
 
 

@@ -99,7 +99,7 @@ def line_spectrum(signal: RangingSignal) -> LineSpectrum:
         information = orders[:, i] ** 2 * power
         enough = (1 - LOST_INFORMATION) * beta**2 / 2
         keep |= information >= _tie(_cut(information, enough))
-    keep |= power >= power[keep].max()
+    keep |= power >= float(np.max(power[keep]))
     _check_overlap(signal, bins, power, keep)
     return LineSpectrum(orders[keep], bins[keep], amplitudes[keep])
 

@@ -46,6 +46,7 @@ def line(stations: int, trains: int, seconds: float = 30.0) -> Scenario:
             "name": "scale",
             "seed": 3,
             "duration_s": seconds,
+            "tick_s": 0.25,
             "tracks": {"main": {"elements": [{"straight_m": length_m}], "speed_limits": [[0, 80]]}},
             "stations": {"zone_length_m": ZONE_M},
             "trains": [

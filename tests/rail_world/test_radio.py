@@ -331,3 +331,24 @@ def test_a_train_that_is_not_on_the_line_hears_nothing_and_is_not_heard() -> Non
     assert state[1, columns["x_m"]] == 100.0
     heard = radio.uplink(0, 0.0, radio.paths(trains), {1: (2, burst())})
     assert heard == {}
+
+
+def test_blocks_that_repeat_and_blocks_that_do_not_arrive_as_their_sum() -> None:
+    one, other = antenna(), antenna(x_m=60.0, site="wrs2", zone="z2")
+    radio = medium(one, other)
+    trains = at((110.0, 0.0))
+    paths = radio.paths(trains)
+    rough = LOUD * np.exp(1j * np.cumsum(np.random.default_rng(2).normal(size=SIGNAL.samples)))
+    parts = [
+        radio.downlink(0, 0.0, paths, blocks)[0, 1].samples for blocks in ({0: burst()}, {1: rough})
+    ]
+    both = radio.downlink(0, 0.0, paths, {0: burst(), 1: rough})[0, 1].samples
+    scale = np.abs(both).max()
+    np.testing.assert_allclose(both, parts[0] + parts[1], rtol=0, atol=1e-5 * scale)
+
+
+def test_a_block_of_another_length_is_refused() -> None:
+    radio = medium()
+    paths = radio.paths(at((50.0, 0.0)))
+    with pytest.raises(ValueError, match="a block of 32 samples, not 960"):
+        radio.downlink(0, 0.0, paths, {0: burst()[:32]})

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import signal
 import threading
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 from .plan import NodeSpec
@@ -47,18 +48,24 @@ def make_node(spec: NodeSpec, context: Any, services: bool) -> Any:
     return node
 
 
-def run_nodes(specs: Iterable[NodeSpec]) -> None:
+def make_nodes(specs: Sequence[NodeSpec], context: Any) -> list[Any]:
+    """Create the nodes of one process; many of them go without parameter services."""
+    services = len(specs) <= MOST_NODES_WITH_SERVICES
+    return [make_node(spec, context, services) for spec in specs]
+
+
+def run_nodes(specs: Sequence[NodeSpec]) -> None:
     """Make nodes in this process and spin them until SIGTERM."""
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
     from rail_msgs_py.standalone import spin
 
-    specs = list(specs)
     context = rclpy.Context()
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
-    services = len(specs) <= MOST_NODES_WITH_SERVICES
-    nodes = [make_node(spec, context, services) for spec in specs]
+    nodes = make_nodes(specs, context)
+    gc.collect()
+    gc.freeze()
     try:
         spin(context, nodes)
     finally:

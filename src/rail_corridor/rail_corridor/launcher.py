@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import signal
@@ -13,7 +14,7 @@ from typing import Any, Literal
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from .host import node_class, run_nodes
+from .host import make_nodes, node_class, run_nodes
 from .middleware import discover_on
 from .plan import WORLD, Placement, Plan, check_external, make_plan
 from .processes import ProcessGroup, remove_orphaned_segments
@@ -78,6 +79,10 @@ class _Run:
         self._console = console
         placement = options.placement or default_placement(plan)
         self._groups = plan.groups(placement, options.only, options.external)
+        # One process is this one: the report then hears every node without leaving it.
+        self._here = [spec for specs in self._groups.values() for spec in specs]
+        if placement != "one":
+            self._here.clear()
         self._processes = ProcessGroup()
         self._signal = 0
         self._world_failed = False
@@ -103,7 +108,7 @@ class _Run:
             for number in (signal.SIGINT, signal.SIGTERM)
         }
         try:
-            for name, specs in self._groups.items():
+            for name, specs in self._groups.items() if not self._here else ():
                 self._processes.start(name, lambda specs=specs: run_nodes(specs))
             self._watch()
         finally:
@@ -140,8 +145,13 @@ class _Run:
             context=context,
             record=self._options.only != "onboard",
         )
+        nodes = [self._observer, *make_nodes(self._here, context)]
         executor = EventsExecutor(context=context)
-        executor.add_node(self._observer)
+        for node in nodes:
+            executor.add_node(node)
+        # What is here now stays: no need to look through it for garbage again.
+        gc.collect()
+        gc.freeze()
         with Progress(
             TextColumn("{task.description}"),
             BarColumn(bar_width=None),
@@ -156,7 +166,9 @@ class _Run:
                 executor.spin_until_future_complete(self._stop, timeout_sec=FOREVER_S)
             self._drain(executor)
         executor.shutdown()
-        self._observer.destroy_node()
+        gc.unfreeze()
+        for node in nodes:
+            node.destroy_node()
         rclpy.try_shutdown(context=context)
 
     def _drain(self, executor: Any) -> None:

@@ -24,13 +24,20 @@ class TickInbox(Generic[Item]):
         self.ports: tuple[str, ...] = tuple(sorted(ports))
         self._awaited = set(self.ports)
         self._ticks: dict[int, dict[str, Item]] = {}
+        self._first: dict[str, Item] | None = None
         self._taken_ns = -1
 
     def put(self, stamp_ns: int, port: str, item: Item) -> None:
         """Add an item; one of a tick already taken only shows that its port is alive again."""
-        self._awaited.add(port)
-        if stamp_ns > self._taken_ns:
-            self._ticks.setdefault(stamp_ns, {})[port] = item
+        if port not in self._awaited:
+            self._awaited.add(port)
+        items = self._ticks.get(stamp_ns)
+        if items is None:
+            if stamp_ns <= self._taken_ns:
+                return
+            items = self._ticks[stamp_ns] = {}
+            self._find_first()
+        items[port] = item
 
     @property
     def stamp_ns(self) -> int | None:
@@ -40,16 +47,15 @@ class TickInbox(Generic[Item]):
     @property
     def complete(self) -> bool:
         """Whether every awaited port of the earliest tick has been heard."""
-        if not self._ticks:
+        items = self._first
+        if items is None or len(items) < len(self._awaited):
             return False
-        items = self._ticks[min(self._ticks)]
-        return len(items) >= len(self._awaited) and self._awaited <= items.keys()
+        return self._awaited <= items.keys()
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Awaited ports not heard yet in the earliest tick, sorted."""
-        items = self._ticks[min(self._ticks)] if self._ticks else {}
-        return tuple(sorted(self._awaited - items.keys()))
+        return tuple(sorted(self._awaited - (self._first or {}).keys()))
 
     @property
     def awaits_anything(self) -> bool:
@@ -75,10 +81,15 @@ class TickInbox(Generic[Item]):
         stamp_ns = min(self._ticks)
         items = self._ticks.pop(stamp_ns)
         self._taken_ns = stamp_ns
+        self._find_first()
         return stamp_ns, {port: items[port] for port in self.ports if port in items}
 
     def reset(self) -> None:
         """Forget everything, as when simulated time jumps back."""
         self._ticks.clear()
+        self._first = None
         self._taken_ns = -1
         self._awaited = set(self.ports)
+
+    def _find_first(self) -> None:
+        self._first = self._ticks[min(self._ticks)] if self._ticks else None

@@ -18,6 +18,7 @@ from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, to_ns
 
 _STAMP = struct.Struct("<iI")
 _TAIL = struct.Struct("<5f")
+_FIGURES = struct.Struct("<2f")
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,12 @@ class RangeReading:
         return cls(clock_from_cdr(raw), zone, range_m, variance_m2, low_m, high_m)
 
 
+def range_from_cdr(raw: bytes) -> tuple[int, float, float]:
+    """Stamp [ns], range [m] and variance [m^2] of a serialised reading, and no more."""
+    range_m, variance_m2 = _FIGURES.unpack_from(raw, len(raw) - _FIGURES.size)
+    return clock_from_cdr(raw), range_m, variance_m2
+
+
 class RangeWriter:
     """Serialises the readings of one antenna: only stamp and figures change."""
 
@@ -94,7 +101,6 @@ class RangeWriter:
         blank = RangeReading(0, zone, 0.0, 0.0, min_range_m, max_range_m)
         raw = serialize_message(blank.to_msg())
         self._head, self._middle = raw[:4], raw[12 : len(raw) - 8]
-        self._figures = struct.Struct("<2f")
 
     def write(self, stamp_ns: int, range_m: float, variance_m2: float) -> bytes:
         """Serialised reading."""
@@ -103,6 +109,6 @@ class RangeWriter:
                 self._head,
                 _STAMP.pack(*divmod(stamp_ns, NANOSECONDS)),
                 self._middle,
-                self._figures.pack(range_m, variance_m2),
+                _FIGURES.pack(range_m, variance_m2),
             )
         )

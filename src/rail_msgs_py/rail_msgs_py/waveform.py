@@ -16,6 +16,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -57,10 +58,16 @@ class Waveform:
     channel: int
     samples: NDArray[np.complex128]
 
-    @property
+    @cached_property
     def silent(self) -> bool:
         """Whether the block carries no sample."""
         return self.samples.size == 0
+
+    @cached_property
+    def row(self) -> NDArray[np.complex128]:
+        """Samples of the first antenna; the same array each time it is asked for."""
+        first: NDArray[np.complex128] = self.samples[0]
+        return first
 
     @property
     def power_dbm(self) -> float:
@@ -183,27 +190,33 @@ def silent_stamp_ns(raw: bytes) -> int | None:
 
 
 class BlockReader:
-    """Reads the blocks of one port; one that is sent again has the very same ``samples`` array.
+    """Reads the blocks of one port; one that is sent again is the very same object.
 
     So that a reader can tell by identity that it need not do its work again.
     """
 
     def __init__(self) -> None:
         self._layout = self._rest = b""
+        self._length = -1
         self._last: Waveform | None = None
 
-    def read(self, raw: bytes) -> Waveform:
-        """View of a serialised block, as `Waveform.from_cdr`."""
-        layout, rest = raw[: _PREFIX.size], raw[_PREFIX.size + _STAMP.size :]
-        last = self._last
-        if last is not None and rest == self._rest and layout == self._layout:
-            stamp_ns = seconds_to_ns(_STAMP.unpack_from(raw, _PREFIX.size)[0])
-            return Waveform(
-                stamp_ns, last.sample_rate_hz, last.carrier_hz, last.channel, last.samples
-            )
+    def read(self, raw: bytes) -> tuple[int, Waveform]:
+        """Stamp [ns] and view of a serialised block.
+
+        The view is as from `Waveform.from_cdr`, with the stamp of when it was first sent.
+        """
+        if (
+            self._last is not None
+            and len(raw) == self._length
+            and raw.endswith(self._rest)
+            and raw.startswith(self._layout)
+        ):
+            stamp_s: float = _STAMP.unpack_from(raw, _PREFIX.size)[0]
+            return seconds_to_ns(stamp_s), self._last
         self._last = Waveform.from_cdr(raw)
-        self._layout, self._rest = layout, rest
-        return self._last
+        self._length = len(raw)
+        self._layout, self._rest = raw[: _PREFIX.size], raw[_PREFIX.size + _STAMP.size :]
+        return self._last.stamp_ns, self._last
 
 
 class RepeatedBlock:

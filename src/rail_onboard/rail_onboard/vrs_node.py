@@ -5,6 +5,7 @@ Topics in: ``channel_<n>/rx`` for every downlink channel. Topics out: ``tx``, ``
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -113,10 +114,13 @@ class VrsNode(Equipment):
         rows = {channel: row for row, channel in enumerate(bursts)}
         estimates: ToneEstimate | None = None
         if self.switched_on and bursts:
-            estimates = self._receiver.estimate(np.stack(list(bursts.values())))
-            with np.errstate(divide="ignore"):
-                dbm = 20.0 * np.log10(estimates.amplitude)
-            levels = {c: float(dbm[row]) for c, row in rows.items() if estimates.detected[row]}
+            estimates = self._receiver.estimate(np.array(list(bursts.values())))
+            amplitude = estimates.amplitude.tolist()
+            levels = {
+                channel: 20.0 * math.log10(amplitude[row])
+                for channel, row in rows.items()
+                if amplitude[row] > 0.0
+            }
         downlink = self._selector.update(levels)
         disturbance = "cannot read the tone" if bursts else "hears no station"
         if estimates is not None and downlink in levels:

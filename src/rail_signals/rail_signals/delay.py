@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import fft
 
 from rail_signals.phasors import cis, rotation
 from rail_signals.ranging_signal import ComplexArray, FloatArray
@@ -51,13 +50,37 @@ def fractional_delay(blocks: ArrayLike, delay_s: ArrayLike, sample_rate_hz: floa
     return np.fft.ifft(np.fft.fft(x) * ramp)
 
 
-def spectra_of(blocks: ArrayLike) -> NDArray[np.complex64]:
-    """Spectra [..., samples] of blocks, for `through_paths`."""
-    return np.asarray(fft(np.asarray(blocks, dtype=np.complex64)))
+def repetition(block: ComplexArray, guess: int = 0) -> int:
+    """Samples after which a block [samples] repeats, to the last bit; its length if it does not.
+
+    Parameters
+    ----------
+    block : complex [samples]
+    guess : int
+        Tried first; taken if the block repeats after so many samples.
+
+    Examples
+    --------
+    >>> repetition(np.array([1j, 2, 1j, 2, 1j, 2])), repetition(np.array([1j, 2, 3]))
+    (2, 3)
+    """
+    samples = len(block)
+    if 0 < guess < samples and samples % guess == 0 and _repeats(block, guess):
+        return guess
+    for count in range(1, samples // 2 + 1):
+        if samples % count == 0 and _repeats(block, count):
+            return count
+    return samples
+
+
+def _repeats(block: ComplexArray, count: int) -> bool:
+    # A quick look at two samples settles most cases.
+    return bool(block[0] == block[count] and (block[:-count] == block[count:]).all())
 
 
 def through_paths(
-    spectra: NDArray[np.complex64],
+    spectra: ComplexArray,
+    samples: int,
     *,
     delay_s: FloatArray,
     shift_hz: FloatArray,
@@ -66,12 +89,15 @@ def through_paths(
 ) -> NDArray[np.complex64]:
     """What arrives over many paths at once: delayed as by `fractional_delay`, shifted, scaled.
 
-    In single precision, whose rounding lies 140 dB below the signal.
+    A block that repeats within the window, as a steady tone does, is delayed as one period.
+    The result is in single precision, whose rounding lies 140 dB below the signal.
 
     Parameters
     ----------
-    spectra : complex64 [path, samples]
-        What each path carries, as from `spectra_of`; overwritten.
+    spectra : complex128 [path, period]
+        Transform of one period of what each path carries; overwritten.
+    samples : int
+        Length of a block, a multiple of the period.
     delay_s, shift_hz : float [path]
         Delay [s] and frequency shift [Hz]; the shift leaves the phase at mid-block alone.
     gain : complex [path]
@@ -83,19 +109,20 @@ def through_paths(
     -------
     complex64 [path, samples]
     """
-    samples = spectra.shape[-1]
-    spectra *= _phase_ramp(delay_s * sample_rate_hz, samples, gain, np.complex64)
+    paths, period = spectra.shape
+    spectra *= _phase_ramp(delay_s * sample_rate_hz, period, gain)
     # In double precision, where a row does not depend on the others that are transformed with it.
-    arrived = np.fft.ifft(spectra.astype(np.complex128)).astype(np.complex64)
-    arrived *= rotation(shift_hz / sample_rate_hz, samples, np.complex64)
-    return arrived
+    arrived = np.fft.ifft(spectra).astype(np.complex64)
+    turning: Any = rotation(shift_hz / sample_rate_hz, samples, np.complex64)
+    turning = turning.reshape(paths, samples // period, period)
+    turning *= arrived[:, None, :]
+    return np.asarray(turning.reshape(paths, samples))
 
 
 def _phase_ramp(
     delay_samples: FloatArray,
     samples: int,
     gain: ComplexArray | None = None,
-    dtype: Any = np.complex128,
 ) -> ComplexArray:
     """``gain exp(-j 2 pi k d / N)`` over the signed bin numbers k in transform order.
 
@@ -104,12 +131,12 @@ def _phase_ramp(
     turn = -2 * math.pi * np.mod(delay_samples, samples)[..., None] / samples
     fine_count = _fine_count(samples)
     first = np.fft.fftfreq(samples, 1 / samples)[::fine_count]
-    fine = cis(turn * np.arange(fine_count)).astype(dtype)
+    fine = cis(turn * np.arange(fine_count))
     coarse = cis(turn * first)
     if gain is not None:
         coarse *= gain[..., None]
     shape = (*turn.shape[:-1], samples)
-    return np.asarray((coarse.astype(dtype)[..., :, None] * fine[..., None, :]).reshape(shape))
+    return np.asarray((coarse[..., :, None] * fine[..., None, :]).reshape(shape))
 
 
 @cache

@@ -5,6 +5,7 @@ Topics in: ``/clock``, every ``range``. Topics out: ``~/<train>/position``, ``~/
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -19,11 +20,11 @@ from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.parameters import ParameterError, declare, parameter
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.range_reading import RangeReading
+from rail_msgs_py.range_reading import range_from_cdr
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.standalone import run_node
 from rail_wayside.zone_map import Zone, ZoneMap
-from rail_wayside.zone_tracking import Fix, Reading, ZoneTracker
+from rail_wayside.zone_tracking import NOT_HEARD, Fix, Reading, ZoneTracker
 
 WATCH_PERIOD_S = 0.1
 _CLOCK_PORT = "clock"
@@ -108,7 +109,7 @@ class ZoneControllerNode(CorridorNode):
         self._writers: dict[tuple[str, str], PositionWriter] = {}
         owners = {zone.name: f"/wayside/{zone.site}" for zone in zone_map.zones.values()}
         # The clock is a port like the others: a tick ends though no station answers.
-        self._inbox: TickInbox[RangeReading | None] = TickInbox([*owners, _CLOCK_PORT])
+        self._inbox: TickInbox[Reading | None] = TickInbox([*owners, _CLOCK_PORT])
         self._watch = FailureWatch(self, owners, self._drop)
         self._waiting_since_s = float("inf")
         for zone in zone_map.zones.values():
@@ -129,8 +130,9 @@ class ZoneControllerNode(CorridorNode):
         self._advance()
 
     def _on_range(self, zone: str, raw: bytes) -> None:
-        reading = RangeReading.from_cdr(raw)
-        self._inbox.put(reading.stamp_ns, zone, reading)
+        stamp_ns, range_m, variance_m2 = range_from_cdr(raw)
+        heard = range_m != math.inf
+        self._inbox.put(stamp_ns, zone, Reading(range_m, variance_m2) if heard else NOT_HEARD)
         self._advance()
 
     def _advance(self) -> None:
@@ -142,11 +144,7 @@ class ZoneControllerNode(CorridorNode):
         self._waiting_since_s = float("inf")
         fixes = self._tracker.update(
             stamp_ns * 1e-9,
-            {
-                zone: Reading(reading.range_m, reading.variance_m2)
-                for zone, reading in readings.items()
-                if reading is not None
-            },
+            {zone: reading for zone, reading in readings.items() if reading is not None},
         )
         for fix in fixes:
             self._publish(stamp_ns, fix)

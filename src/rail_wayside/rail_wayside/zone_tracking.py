@@ -31,6 +31,9 @@ class Reading:
     variance_m2: float
 
 
+NOT_HEARD = Reading(math.inf, math.inf)
+
+
 @dataclass(frozen=True)
 class Fix:
     """Where a train is. Infinite variance: not known, the chainage is the last that was."""
@@ -91,6 +94,8 @@ class ZoneTracker:
         places: list[_Place] = []
         disturbed: list[str] = []
         for name, reading in readings.items():
+            if reading is NOT_HEARD:
+                continue
             if math.isnan(reading.range_m):
                 disturbed.append(name)
             elif math.isfinite(reading.range_m):

@@ -10,13 +10,14 @@ station antenna a link does not exist, in either direction.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.delay import spectra_of, through_paths
+from rail_signals.delay import repetition, through_paths
 from rail_signals.phasors import cis
 from rail_world.noise import NoiseSource
 from rail_world.radio_description import AntennaPattern, RadioDescription
@@ -55,11 +56,11 @@ class Paths:
 
 @dataclass(frozen=True)
 class _Sent:
-    """A block that an antenna sends, its mean power and its spectrum."""
+    """A block that an antenna sends, its mean power and the transform of its period."""
 
     samples: ComplexArray
     power_mw: float
-    spectrum: NDArray[np.complex64]
+    spectrum: ComplexArray
 
 
 @dataclass(frozen=True)
@@ -238,7 +239,8 @@ class RadioMedium:
         offsets = self._station_offset[s] - self._train_offset[t]
         carrier_phase = -2.0 * np.pi * np.mod(carrier_hz * delay_s, 1.0)
         arrived = through_paths(
-            np.stack([sent[link].spectrum for link in audible]),
+            _stacked([sent[link].spectrum for link in audible.tolist()]),
+            radio.samples,
             delay_s=delay_s,
             shift_hz=doppler_hz + carrier_hz * (-offsets if uplink else offsets),
             gain=10.0 ** (gain_db[audible] / 20.0) * cis(carrier_phase),
@@ -268,8 +270,14 @@ class RadioMedium:
         """Power and spectrum of a block; a block that is sent again is not transformed again."""
         known = self._known.get((uplink, sender))
         if known is None or known.samples is not samples:
-            power_mw = float(np.vecdot(samples, samples).real) / len(samples)
-            known = _Sent(samples, power_mw, spectra_of(samples))
+            if len(samples) != self.description.samples:
+                raise ValueError(
+                    f"a block of {len(samples)} samples, not {self.description.samples}"
+                )
+            period = repetition(samples, len(known.spectrum) if known else 0)
+            one = samples[:period]
+            power_mw = float(np.vdot(one, one).real) / period
+            known = _Sent(samples, power_mw, np.fft.fft(one))
             self._known[uplink, sender] = known
         return known
 
@@ -298,3 +306,16 @@ class RadioMedium:
             )
             total += 10.0 ** ((fault.power_dbm + gain_db - loss_db) / 10.0)
         return total
+
+
+def _stacked(spectra: list[ComplexArray]) -> ComplexArray:
+    """Transforms [path, period] of a common period: a shorter one leaves bins empty."""
+    periods = {len(spectrum) for spectrum in spectra}
+    if len(periods) == 1:
+        return np.array(spectra)
+    period = math.lcm(*periods)
+    stacked = np.zeros((len(spectra), period), dtype=np.complex128)
+    for row, spectrum in zip(stacked, spectra, strict=True):
+        repeats = period // len(spectrum)
+        row[::repeats] = spectrum * repeats
+    return stacked

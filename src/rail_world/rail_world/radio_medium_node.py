@@ -98,7 +98,6 @@ class RadioMediumNode(CorridorNode):
             for channel, carrier_hz in radio.carriers_hz.items()
         }
         self._readers = {port: BlockReader() for port in owners if port != _STATE_PORT}
-        self._rows: dict[str, tuple[Any, Any]] = {}
         self._paths: Paths | None = None
         self._heard: dict[tuple[int, int], Reception] = {}
         self._stage_begun_s = float("inf")
@@ -106,13 +105,8 @@ class RadioMediumNode(CorridorNode):
         self.announce_when_connected()
 
     def _put(self, inbox: TickInbox[Any], port: str, raw: bytes) -> None:
-        block = self._readers[port].read(raw)
-        # One row of samples, the same object if the block is: the medium knows it by that.
-        rows = self._rows.get(port)
-        if rows is None or rows[0] is not block.samples:
-            rows = block.samples, None if block.silent else block.samples[0]
-            self._rows[port] = rows
-        inbox.put(block.stamp_ns, port, (block.channel, rows[1]))
+        stamp_ns, block = self._readers[port].read(raw)
+        inbox.put(stamp_ns, port, block)
         self._advance()
 
     def _on_state(self, raw: bytes) -> None:
@@ -133,9 +127,9 @@ class RadioMediumNode(CorridorNode):
             return
         self._paths = self._medium.paths(antennas_of(state))
         blocks = {
-            index: items[port][1]
+            index: items[port].row
             for index, port in enumerate(self._station_ports)
-            if port in items and items[port][1] is not None
+            if port in items and not items[port].silent
         }
         tick, time_s = stamp_ns // self._tick_ns, stamp_ns * 1e-9
         self._heard = self._medium.downlink(tick, time_s, self._paths, blocks)
@@ -148,9 +142,9 @@ class RadioMediumNode(CorridorNode):
     def _deliver_uplink(self, stamp_ns: int, items: dict[str, Any]) -> None:
         assert self._paths is not None
         blocks = {
-            index: items[port]
+            index: (items[port].channel, items[port].row)
             for index, port in enumerate(self._train_ports)
-            if port in items and items[port][1] is not None
+            if port in items and not items[port].silent
         }
         tick, time_s = stamp_ns // self._tick_ns, stamp_ns * 1e-9
         heard = self._medium.uplink(tick, time_s, self._paths, blocks)

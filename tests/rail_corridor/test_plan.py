@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from rail_corridor.plan import (
     Placement,
     Plan,
     make_plan,
-    write_nodes,
 )
 from rail_corridor.scenario import Overrides, load_scenario
 from rail_corridor.world_plan import reach_m, survey
@@ -159,11 +157,3 @@ def test_a_plan_is_repeatable_and_units_differ(tmp_path: Path) -> None:
             unit = one.transponders[spec.site]
             assert spec.parameters["transponder_delay_s"] == unit.delay_s
             assert spec.parameters["delay_trim_s"] == unit.trim_s
-
-
-def test_nodes_can_be_written_for_those_who_start_them_by_hand(tmp_path: Path) -> None:
-    plan = plan_of("plain_line", tmp_path)
-    path = tmp_path / "nodes.json"
-    write_nodes(path, plan.nodes)
-    read = json.loads(path.read_text())
-    assert [node["name"] for node in read] == [spec.name for spec in plan.nodes]

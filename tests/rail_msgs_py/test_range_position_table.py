@@ -132,9 +132,8 @@ def test_a_row_of_a_table_by_name() -> None:
 
 
 def test_table_data_begin_with_the_stamp() -> None:
-    writer = TableWriter(("a",), ("x_m", "y_m"))
-    raw = writer.write(2_500_000_000, np.array([[1.0, -1.0]]))
-    assert np.frombuffer(raw, np.float64, 3, writer.data_at).tolist() == [2.5, 1.0, -1.0]
+    raw = TableWriter(("a",), ("x_m", "y_m")).write(2_500_000_000, np.array([[1.0, -1.0]]))
+    assert np.frombuffer(raw[-24:], np.float64).tolist() == [2.5, 1.0, -1.0]
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from typing import Any, Literal
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+from .domain import sole_corridor
 from .host import make_nodes, node_class, run_nodes
 from .middleware import discover_on
 from .plan import WORLD, Placement, Plan, check_external, make_plan
@@ -58,7 +59,8 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
             external=options.external,
         )
         check_external(plan, options.external)
-        return _Run(scenario, options, plan, console).run()
+        with sole_corridor(options.only):
+            return _Run(scenario, options, plan, console).run()
     finally:
         shutil.rmtree(directory, ignore_errors=True)
 

@@ -26,7 +26,7 @@ from .decoded import decode, raw_text
 from .middleware import discover_on
 
 #: Wall time for discovery to show what is there.
-DISCOVERY_S = 30.0
+DISCOVERY_S = 15.0
 #: ... and without anything new for this long, that is all.
 SETTLED_S = 2.0
 _POLL_S = 0.05

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import difflib
-import json
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -241,8 +240,3 @@ def _controller(scenario: Scenario, layout: Layout, timeout_s: float) -> dict[st
         "entry_zones": tuple(entry),
         "timeout_s": timeout_s,
     }
-
-
-def write_nodes(path: Path, specs: Iterable[NodeSpec]) -> None:
-    """Write the nodes of one process, for those who want to start it by hand."""
-    path.write_text(json.dumps([asdict(spec) for spec in specs], indent=1))

@@ -98,11 +98,6 @@ class TableWriter:
         """Serialised table; ``values`` [row, column] must be C-contiguous float64."""
         return b"".join((self._prefix, struct.pack("<d", stamp_ns / NANOSECONDS), values.tobytes()))
 
-    @property
-    def data_at(self) -> int:
-        """Offset of the stamp in the serialised message."""
-        return len(self._prefix)
-
 
 def figures_from_cdr(raw: bytes, rows: int, columns: int) -> tuple[int, NDArray[np.float64]]:
     """Stamp [ns] and values [row, column] of a serialised table of known shape."""

@@ -9,12 +9,7 @@ from __future__ import annotations
 
 import math
 
-#: Noise this far above that of the receiver is a jammer [dB].
-JAMMING_LIMIT_DB = 6.0
-#: Line residuals this far above the noise are another signal (chi-square per degree of freedom),
-MISFIT_LIMIT = 6.0
-#: if they also hold this share of the signal.
-MISFIT_SHARE = 1e-5
+from rail_signals.interference import JAMMING_LIMIT_DB, second_signal
 
 
 class DownlinkCheck:
@@ -54,6 +49,6 @@ class DownlinkCheck:
             return "cannot read the tone"
         if amplitude**2 / snr > self._jamming_mw:
             return "channel jammed"
-        if misfit > MISFIT_LIMIT and misfit / (snr * self._samples) > MISFIT_SHARE:
+        if second_signal(misfit, snr, self._samples):
             return "hears more than one station"
         return ""

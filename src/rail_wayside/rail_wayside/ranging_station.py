@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_signals.comparators import and_comparator
+from rail_signals.interference import JAMMING_LIMIT_DB, MISFIT_LIMIT, second_signal
 from rail_signals.line_receiver import LineReceiver, ToneEstimate
 from rail_signals.phase_range import (
     phase_to_range_m,
@@ -21,14 +22,8 @@ from rail_signals.ranging_signal import RangingSignal, discriminate, tone_of
 
 Comparator = Literal["and", "quadrature", "two_tone"]
 
-#: Line residuals this far above the noise are another signal (chi-square per degree of freedom).
-MISFIT_LIMIT = 6.0
-#: ... if they also hold this share of the signal. A second train 40 m or more from the first is
-#: told down to -20 dB; what is missed moves the range by its relative amplitude times c / 4 pi f.
-MISFIT_SHARE = 1e-5
-#: Noise this far above the expected is a jammer [dB].
-JAMMING_LIMIT_DB = 6.0
-#: ... or another signal whose carrier lies far off: then less misfit is enough.
+#: Where the noise is that of a jammer, or of a signal whose carrier lies far off, less misfit is
+#: enough to tell a second signal.
 JAMMED_MISFIT_LIMIT = 2.5
 
 _GRID = 64  # samples per tone period in front of the AND gate
@@ -99,11 +94,9 @@ class RangingStation:
             return NOTHING_HEARD
         amplitude = float(estimate.amplitude)
         noise_mw = amplitude**2 / float(estimate.snr)
-        misfit = float(estimate.misfit)
-        share = misfit / (float(estimate.snr) * burst.size)
         jammed = noise_mw > self._jamming_mw
         limit = JAMMED_MISFIT_LIMIT if jammed else MISFIT_LIMIT
-        if misfit > limit and share > MISFIT_SHARE:
+        if second_signal(float(estimate.misfit), float(estimate.snr), burst.size, limit):
             return Reading(math.nan, math.inf, "more than one signal in the zone")
         range_m, variance_m2 = self._compare(estimate, burst)
         if math.isnan(range_m):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -13,6 +17,26 @@ settings.load_profile("corridor")
 
 # Tests never talk to a corridor that runs on this or another machine.
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+
+#: Domains that tests share; one at a time has each.
+_DOMAINS = range(40, 100)
+
+
+@pytest.fixture
+def ros_domain() -> Iterator[int]:
+    """Return a ROS domain that no other test on this machine is in."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    for step in range(len(_DOMAINS)):
+        domain = _DOMAINS[(worker * 7 + step) % len(_DOMAINS)]
+        path = Path(tempfile.gettempdir()) / f"rail_corridor_test_domain_{domain}.lock"
+        with path.open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            yield domain
+            return
+    raise RuntimeError("every domain is taken")
 
 
 @pytest.hookimpl(tryfirst=True)

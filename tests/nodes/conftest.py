@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
-import tempfile
 from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import pytest
 import rclpy
@@ -24,30 +20,12 @@ from rail_msgs_py.topics import Topic
 
 #: Only ever reached by a test that fails.
 PATIENCE_S = 30.0
-#: Domains that tests share; one at a time has each.
-_DOMAINS = range(70, 101)
-
-
-def _claim_domain() -> tuple[int, IO[str]]:
-    """Return a domain that no other test on this machine is in, and the lock that keeps it."""
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    for step in range(len(_DOMAINS)):
-        domain = _DOMAINS[(worker * 7 + step) % len(_DOMAINS)]
-        lock = (Path(tempfile.gettempdir()) / f"rail_corridor_domain_{domain}.lock").open("w")
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            lock.close()
-        else:
-            return domain, lock
-    raise RuntimeError("every domain is taken")
 
 
 class Graph:
     """Nodes under test, and a bystander that talks to them."""
 
-    def __init__(self) -> None:
-        domain, self._lock = _claim_domain()
+    def __init__(self, domain: int) -> None:
         self.context = rclpy.Context()
         rclpy.init(
             context=self.context,
@@ -128,7 +106,6 @@ class Graph:
         for node in (*self._nodes, self.bystander):
             node.destroy_node()
         rclpy.try_shutdown(context=self.context)
-        self._lock.close()
 
     def _look(self) -> None:
         if not self._reached.done() and self._predicate():
@@ -136,9 +113,9 @@ class Graph:
 
 
 @pytest.fixture
-def graph() -> Iterator[Graph]:
+def graph(ros_domain: int) -> Iterator[Graph]:
     """Return a graph that no other test can hear."""
-    made = Graph()
+    made = Graph(ros_domain)
     try:
         yield made
     finally:

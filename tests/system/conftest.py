@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 import re
@@ -26,7 +25,6 @@ ROOT = Path(__file__).resolve().parents[2]
 #: Generous: it only makes a test fail that would otherwise hang.
 PATIENCE_S = 90.0
 _TOKEN = "RAIL_TEST_TOKEN"
-_domains = itertools.count(os.getpid())
 
 
 @pytest.fixture
@@ -60,7 +58,7 @@ class Rail:
     """Runs ``rail`` commands that share a domain and a mark in their environment."""
 
     directory: Path
-    domain: int = field(default_factory=lambda: 40 + next(_domains) % 60)
+    domain: int
     token: str = field(default_factory=lambda: uuid.uuid4().hex)
     started: list[subprocess.Popen[str]] = field(default_factory=list)
 
@@ -135,9 +133,9 @@ class Rail:
 
 
 @pytest.fixture
-def rail(tmp_path: Path) -> Iterator[Rail]:
+def rail(tmp_path: Path, ros_domain: int) -> Iterator[Rail]:
     """Return a runner of ``rail``; whatever it has started is gone afterwards."""
-    runner = Rail(tmp_path)
+    runner = Rail(tmp_path, ros_domain)
     yield runner
     for pid in runner.processes():
         try:

@@ -11,7 +11,7 @@ from rail_corridor.recording import Record, Recording
 
 
 def test_a_record_grows_and_shows_its_gaps() -> None:
-    record = Record(trains=2, columns=3)
+    record = Record(rows=2, columns=3)
     record.put(5000, 1, np.array([1.0, 2.0, 3.0]))
     record.put(0, slice(None), np.ones((2, 3)))
     assert record.ticks == 5001

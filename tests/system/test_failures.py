@@ -34,7 +34,7 @@ def test_a_killed_process_is_named_and_the_corridor_goes_on(
     failed = listener.listen(topics.FAILED)
     clock = listener.listen(topics.CLOCK)
     run = rail.start(
-        *("run", "branch", "--duration", 30, "--rate", 5, "--processes", "site"),
+        *("run", "branch", "--duration", 15, "--rate", 5, "--processes", "site"),
         *("--report", path),
     )
     listener.until(lambda: len(clock) > 10)
@@ -48,7 +48,7 @@ def test_a_killed_process_is_named_and_the_corridor_goes_on(
     assert rail.finish(run) == 0
     report = json.loads(path.read_text())
     assert report["complete"]
-    assert report["ticks"] == 300
+    assert report["ticks"] == 150
     (failure,) = report["failures"]
     assert failure["node"] == node
     assert "SIGKILL" in failure["reason"]

@@ -17,7 +17,11 @@ from .errors import InputError
 COLUMNS = ("name", "unit", "ours", "peer_name", "peer", "ratio", "bound")
 _FOLDER = Path(__file__).resolve().parents[3] / "benchmarks"
 #: Module of the benchmarks folder -> first part of the names of its rows.
-MODULES = {"ranging_receive": "ranging", "corridor_speed": "corridor"}
+MODULES = {
+    "ranging_receive": "ranging",
+    "track_code_decode": "track_code",
+    "corridor_speed": "corridor",
+}
 
 
 def run_benchmarks(names: tuple[str, ...], path: Path | None) -> int:

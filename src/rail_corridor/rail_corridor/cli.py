@@ -209,6 +209,28 @@ def hz(
 
 
 @app.command()
+def figures(
+    directory: Annotated[
+        Path, typer.Argument(help="Where the pictures go.", metavar="[OUTDIR]")
+    ] = Path("figures"),
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", help="Draw this figure; repeatable.", metavar="NAME"),
+    ] = None,
+) -> None:
+    """Draw the figures of the source documents and of the project, from its own code."""
+    from .figures import FIGURES, draw
+
+    for name in only or ():
+        _choice("--only", name, tuple(FIGURES))
+    if directory.exists() and not directory.is_dir():
+        raise UsageError(f"OUTDIR: {directory}: is not a directory")
+    _check_writable("OUTDIR", directory / "any")
+    for path in draw(directory, tuple(only or ())):
+        typer.echo(path)
+
+
+@app.command()
 def bench(
     names: Annotated[
         list[str] | None, typer.Argument(help="Rows to run; all if none.", metavar="NAME...")

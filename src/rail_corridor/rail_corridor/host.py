@@ -10,7 +10,7 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
-from .plan import NodeSpec
+from .node_spec import NodeSpec
 
 #: Kind of node -> module and class; the ament packages name the same modules.
 NODE_CLASSES = {
@@ -19,9 +19,16 @@ NODE_CLASSES = {
     "wrs": ("rail_wayside.wrs_node", "WrsNode"),
     "zone_controller": ("rail_wayside.zone_controller_node", "ZoneControllerNode"),
     "vrs": ("rail_onboard.vrs_node", "VrsNode"),
+    "rail_medium": ("rail_world.rail_medium_node", "RailMediumNode"),
+    "track_code_transmitter": (
+        "rail_wayside.track_code_transmitter_node",
+        "TrackCodeTransmitterNode",
+    ),
+    "track_code_receiver": ("rail_onboard.track_code_receiver_node", "TrackCodeReceiverNode"),
+    "code_supervision": ("rail_onboard.code_supervision_node", "CodeSupervisionNode"),
 }
 #: Kinds whose name is a parameter of the scenario rather than of the class.
-_NAMED = {"wrs", "vrs"}
+_NAMED = {"wrs", "vrs", "track_code_transmitter", "track_code_receiver", "code_supervision"}
 #: With more nodes than this in a process the parameter services are left out.
 MOST_NODES_WITH_SERVICES = 12
 

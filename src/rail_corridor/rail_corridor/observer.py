@@ -19,7 +19,7 @@ from rail_msgs_py.stamps import to_ns
 from rail_msgs_py.table import figures_from_cdr
 
 from .plan import Plan
-from .recording import Recording
+from .recording import Record, Recording
 
 NAME = "report"
 _MOST_EVENTS = 10_000
@@ -59,7 +59,9 @@ class Observer(CorridorNode):
         self._tick_ns = plan.world.tick_ns
         self._tracks = {name: index for index, name in enumerate(tracks)}
         channels = len({antenna.downlink_channel for antenna in radio.stations})
-        self.recording = Recording(radio.trains, tracks, channels)
+        rails = plan.world.rails
+        circuits = () if rails is None else tuple(circuit.name for circuit in rails.circuits)
+        self.recording = Recording(radio.trains, tracks, channels, circuits)
         self._width = 2 + channels
         self.failures: list[dict[str, Any]] = []
         self.events: list[dict[str, Any]] = []
@@ -81,6 +83,7 @@ class Observer(CorridorNode):
                 self.stream_in(
                     topics.VRS_CHANNEL, lambda raw, i=index: self._on_channel(i, raw), train=train
                 )
+            self._listen_to_codes()
         self.every(0.1, on_progress)
         self.announce_when_connected()
 
@@ -94,7 +97,7 @@ class Observer(CorridorNode):
         """Whether the last tick of a finished run has been read in full."""
         if self.finished_ticks is None:
             return False
-        records = (self.recording.position, self.recording.channel, self.recording.links)
+        records = (*self.recording.estimates, self.recording.links)
         if not self.recording.trains:
             return True
         last = self.finished_ticks - 1
@@ -106,6 +109,23 @@ class Observer(CorridorNode):
     def announce_failure(self, node: str, reason: str) -> None:
         """Tell the corridor that a node has gone."""
         self._failed.publish(failure(node, reason, "the launcher"))
+
+    def _listen_to_codes(self) -> None:
+        recording = self.recording
+        for index, circuit in enumerate(recording.circuits):
+            self._record(recording.sent, topics.CODE_SENT, index, circuit=circuit)
+        for index, train in enumerate(recording.trains if recording.circuits else ()):
+            self._record(recording.received, topics.CODE_RECEIVED, index, train=train)
+            self._record(recording.command, topics.COMMAND, index, train=train)
+
+    def _record(self, record: Record, topic: topics.Topic, row: int, **parts: object) -> None:
+        """Record the one row of each table on a topic."""
+
+        def put(raw: bytes) -> None:
+            stamp_ns, figures = figures_from_cdr(raw, 1, record.columns)
+            record.put(stamp_ns // self._tick_ns, row, figures[0])
+
+        self.stream_in(topic, put, **parts)
 
     def _on_state(self, raw: bytes) -> None:
         trains = len(self.recording.trains)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,35 +15,18 @@ from rail_world.radio import THERMAL_NOISE_DBM_PER_HZ
 from rail_world.world_file import WorldFile
 
 from .calibration import Transponder, calibrate
+from .code_plan import code_nodes
 from .errors import InputError
 from .layout import Layout
+from .node_spec import NodeSpec, Side
 from .scenario import Scenario
 from .world_plan import survey, world_file
 
 Placement = Literal["one", "site", "node"]
-Side = Literal["world", "wayside", "onboard"]
 
 WORLD, MEDIUM, CONTROLLER = "/world", "/world/radio_medium", "/wayside/zone_controller"
 #: Participants of one host that discovery on the local host can bring together, with margin.
 MOST_PROCESSES = 26
-
-
-@dataclass(frozen=True)
-class NodeSpec:
-    """One node: its kind, its full name, where it belongs, its parameters."""
-
-    kind: str
-    name: str
-    side: Side
-    parameters: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def site(self) -> str:
-        """What it shares a process with: its wayside site or train."""
-        if self.side == "world":
-            return "world"
-        parts = self.name.strip("/").split("/")
-        return parts[1] if parts[0] == "wayside" else parts[0]
 
 
 @dataclass(frozen=True)
@@ -144,16 +127,21 @@ def make_plan(
         "world",
         {"world_file": str(world_path), "timeout_s": 2 * timeout_s / 5},
     )
-    others = [medium, controller, *equipment]
+    codes = code_nodes(scenario, str(world_path), timeout_s)
+    others = [medium, controller, *equipment, *codes]
+    sinks = [MEDIUM, CONTROLLER, *(spec.name for spec in codes if spec.kind == "rail_medium")]
+    clocked = {"wrs", "track_code_transmitter"}
     parameters = {
         "world_file": str(world_path),
         "ticks": scenario.ticks,
         "rate": float(rate),
         "nodes": tuple(spec.name for spec in others),
-        "sinks": (MEDIUM, CONTROLLER),
+        "sinks": tuple(sinks),
         "clock_readers": len(
-            {CONTROLLER, *(spec.name for spec in equipment if spec.kind == "wrs")} - {*external}
+            {CONTROLLER, *(spec.name for spec in others if spec.kind in clocked)} - {*external}
         ),
+        "supervised": tuple(scenario.supervised),
+        "cab_signals": scenario.track_circuits is None or scenario.track_circuits.cab_signals,
         "observed": observed,
         "end_when_arrived": scenario.end_when_arrived,
         "timeout_s": timeout_s,

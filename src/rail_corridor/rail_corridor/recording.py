@@ -14,10 +14,11 @@ _FIRST_TICKS = 1024
 
 
 class Record:
-    """One table per tick, [tick, train, column]; NaN where nothing was received."""
+    """One table per tick, [tick, train or circuit, column]; NaN where nothing was received."""
 
-    def __init__(self, trains: int, columns: int) -> None:
-        self._values = np.full((_FIRST_TICKS, trains, columns), np.nan)
+    def __init__(self, rows: int, columns: int) -> None:
+        self._values = np.full((_FIRST_TICKS, rows, columns), np.nan)
+        self.columns = columns
         self.ticks = 0
 
     def put(self, tick: int, train: int | slice, values: FloatArray) -> None:
@@ -44,13 +45,31 @@ class Recording:
         Names, in the order of the scenario.
     channels : int
         Number of downlink channels.
+    circuits : tuple of str
+        Names of the track circuits, in the order of the scenario; with any, trains obey codes.
     """
 
-    def __init__(self, trains: tuple[str, ...], tracks: tuple[str, ...], channels: int) -> None:
-        from rail_msgs_py.topics import LINK_COLUMNS, STATE_COLUMNS
+    def __init__(
+        self,
+        trains: tuple[str, ...],
+        tracks: tuple[str, ...],
+        channels: int,
+        circuits: tuple[str, ...] = (),
+    ) -> None:
+        from rail_msgs_py.topics import (
+            COMMAND_COLUMNS,
+            LINK_COLUMNS,
+            RECEIVED_COLUMNS,
+            SENT_COLUMNS,
+            STATE_COLUMNS,
+        )
 
         self.trains = trains
         self.tracks = tracks
+        self.circuits = circuits
+        self.sent = Record(len(circuits), len(SENT_COLUMNS))
+        self.received = Record(len(trains), len(RECEIVED_COLUMNS))
+        self.command = Record(len(trains), len(COMMAND_COLUMNS))
         self.state = Record(len(trains), len(STATE_COLUMNS))
         self.links = Record(len(trains), len(LINK_COLUMNS))
         self.channel = Record(len(trains), 2 + channels)
@@ -62,9 +81,15 @@ class Recording:
         return self.state.ticks
 
     @property
+    def estimates(self) -> tuple[Record, ...]:
+        """What the equipment on the trains and for them has made out."""
+        ranging = (self.position, self.channel)
+        return (*ranging, self.received, self.command) if self.circuits else ranging
+
+    @property
     def missing_ticks(self) -> int:
         """Ticks of which any figure has not arrived; 0 when nothing is lost."""
-        parts = (self.state, self.links, self.channel, self.position)
+        parts = (self.state, self.links, *self.estimates)
         if not self.trains:
             return 0
         gaps = [np.isnan(part.upto(self.ticks)[:, :, 0]).any(axis=1) for part in parts]
@@ -73,7 +98,7 @@ class Recording:
     def digest(self) -> str:
         """SHA-256 of everything the equipment estimated, to the last bit."""
         total = hashlib.sha256()
-        for record in (self.position, self.channel):
+        for record in self.estimates:
             values = np.ascontiguousarray(record.upto(self.ticks), dtype="<f8")
             # One bit pattern for every NaN.
             total.update(np.where(np.isnan(values), np.nan, values).tobytes())

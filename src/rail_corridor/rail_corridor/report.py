@@ -10,6 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from .code_metrics import code_metrics
 from .metrics import train_metrics
 from .observer import Observer
 from .plan import Plan
@@ -37,6 +38,8 @@ def make_report(
         section = train_metrics(scenario, recording, index)
         unit = plan.transponders[name]
         section["phase_ranging"]["calibration_residual_m"] = unit.residual_m
+        if recording.circuits:
+            section |= code_metrics(scenario, recording, index)
         trains[name] = section
     return {
         "scenario": plan.scenario,
@@ -80,6 +83,7 @@ def print_report(report: dict[str, Any], console: Console) -> None:
             *(_metres(ranging[key]) for key in ("rmse_m", "bound_m", "p95_m", "max_m")),
         )
     console.print(table)
+    _print_codes(report["trains"], console)
     factor = report["real_time_factor"]
     speed = f"{factor:.1f} times real time, " if factor else ""
     console.print(
@@ -96,6 +100,44 @@ def print_report(report: dict[str, Any], console: Console) -> None:
             soft_wrap=True,
         )
     _print_events(report["events"], console)
+
+
+def _print_codes(trains: dict[str, Any], console: Console) -> None:
+    """Show what trains understood from the rails, and what supervision did."""
+    obeying = {name: train for name, train in trains.items() if "track_code" in train}
+    if not obeying:
+        return
+    table = Table(
+        title="codes understood, and supervision", title_justify="left", title_style="bold"
+    )
+    headings = (
+        "train",
+        "codes",
+        "wrong",
+        "valid",
+        "after s",
+        "braked",
+        "over s",
+        "entered",
+        "gap m",
+    )
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "train" else "right", no_wrap=True)
+    for name, train in obeying.items():
+        code, atp = train["track_code"], train["atp"]
+        margin_m = atp["margin_min_m"]
+        table.add_row(
+            name,
+            f"{code['decoded']}/{code['sent']}",
+            str(code["wrong"]),
+            "-" if code["availability"] is None else f"{100.0 * code['availability']:.0f} %",
+            "-" if code["latency_s"] is None else f"{code['latency_s']:.2f}",
+            str(atp["interventions"]),
+            f"{atp['overspeed_s']:.1f}",
+            str(atp["entered_occupied"]),
+            "-" if margin_m is None else f"{margin_m:.0f}",
+        )
+    console.print(table)
 
 
 def _print_events(events: list[dict[str, Any]], console: Console) -> None:

@@ -21,6 +21,7 @@ from rail_world.description import (
 )
 from rail_world.network import Network, build_network
 
+from .circuits import Circuit, place_circuits
 from .errors import InputError, from_validation
 from .layout import Layout, place_stations
 from .overrides import Overrides, apply_overrides, blame_override
@@ -31,6 +32,7 @@ from .sections import (
     RadioPlan,
     RangingPlan,
     StationPlan,
+    TrackCircuitPlan,
     TransponderPlan,
     Whole,
 )
@@ -61,6 +63,9 @@ class Scenario(Description):
     ranging: RangingPlan = Field(default=RangingPlan(), description="ranging signal")
     radio: RadioPlan = Field(default=RadioPlan(), description="radio link")
     transponder: TransponderPlan = Field(default=TransponderPlan(), description="on board")
+    track_circuits: TrackCircuitPlan | None = Field(
+        default=None, description="codes in the rails, which trains obey; null = none"
+    )
     trains: tuple[TrainDescription, ...] = Field(
         default=(), max_length=100, description="trains one by one"
     )
@@ -96,6 +101,20 @@ class Scenario(Description):
     def layout(self) -> Layout:
         """Stations and zones; InputError if they cannot be placed."""
         return place_stations(self.network, self.stations, self.channels)
+
+    @cached_property
+    def circuits(self) -> tuple[Circuit, ...]:
+        """Track circuits in the order of the tracks; none without a plan for them."""
+        plan = self.track_circuits
+        if plan is None:
+            return ()
+        longest_m = max((train.vehicle.length_m for train in self.trains), default=0.0)
+        return place_circuits(self.network, plan, longest_m)
+
+    @property
+    def supervised(self) -> tuple[str, ...]:
+        """Trains that obey the codes in the rails."""
+        return () if self.track_circuits is None else tuple(train.name for train in self.trains)
 
     def to_json(self) -> str:
         """Return the scenario as JSON, for another process or a recording."""

@@ -11,9 +11,10 @@ from rail_world.description import TrainDescription
 from rail_world.errors import WorldDataError
 from rail_world.motion import TrainMotion
 
+from .code_checks import check_codes
 from .errors import InputError, from_world
 from .layout import Layout
-from .sections import LONGEST_ZONE_M, DeadStation, StationPlan
+from .sections import LONGEST_ZONE_M, DeadStation, Jam, StationPlan
 from .timetable import CLEARING_TIME_S
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def check_scenario(scenario: Scenario, train_fields: Sequence[str]) -> None:
     _check_places_of_trains(scenario.trains, train_fields)
     _check_first_zones(scenario, layout, train_fields)
     _check_faults(scenario, layout)
+    check_codes(scenario, train_fields)
 
 
 def _check_zone_lengths(scenario: Scenario, layout: Layout) -> None:
@@ -181,6 +183,8 @@ def _check_faults(scenario: Scenario, layout: Layout) -> None:
                     field=f"{field}.station",
                     value=fault.station,
                 )
+            continue
+        if not isinstance(fault, Jam):
             continue
         if fault.channel not in scenario.channels.numbers:
             raise InputError(

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.ranging_signal import RangingSignal
+from rail_signals.track_code_profile import load_profile
 from rail_world.description import (
     Chainage,
     Description,
@@ -22,6 +23,8 @@ from rail_world.description import (
 
 LONGEST_ZONE_M: Final = 2000.0
 SHORTEST_ZONE_M: Final = 20.0
+#: Profile whose fields the supervision of trains understands.
+TRACK_CODE: Final = "tones27"
 
 
 def _not_a_bool(value: object) -> object:
@@ -231,6 +234,71 @@ class RadioPlan(Description):
     )
 
 
+class TrackCircuitPlan(Description):
+    """Track circuits that send codes, and what trains make of them.
+
+    With this section trains run on what they understand from the rails.
+    """
+
+    length_m: Number = Field(
+        default=500.0, ge=50.0, le=3000.0, description="no circuit is longer than this [m]"
+    )
+    carriers_hz: tuple[Frequency, ...] = Field(
+        default=(1700.0, 2300.0),
+        min_length=2,
+        max_length=4,
+        description="carriers in turn along a track [Hz]",
+    )
+    sample_rate_hz: Frequency = Field(
+        default=16_000.0, description="sample rate in the rails; a multiple of 128 Hz"
+    )
+    braking_mps2: Number = Field(
+        default=0.5, ge=0.1, le=2.0, description="braking that the codes count on [m/s^2]"
+    )
+    cab_signals: bool = Field(
+        default=True, description="drivers keep to the permitted speed before the brake makes them"
+    )
+    attenuation_db_per_km: Number = Field(
+        default=6.0, ge=0.0, le=100.0, description="of the rails [dB/km]"
+    )
+    snr_db: Number = Field(
+        default=40.0,
+        ge=-20.0,
+        le=100.0,
+        description="level at the transmitter over white noise in 300 Hz [dB]",
+    )
+    joint_db: Number = Field(
+        default=30.0, ge=0.0, le=120.0, description="crosstalk past a joint, below the signal [dB]"
+    )
+    harmonics: tuple[tuple[Whole, Number], ...] = Field(
+        default=((31, -30.0), (33, -33.0), (35, -34.0), (37, -36.0), (47, -40.0)),
+        max_length=100,
+        description="traction current: [harmonic of 50 Hz, level against the transmitter in dB]",
+    )
+    impulses_per_s: Number = Field(
+        default=0.2, ge=0.0, le=1000.0, description="impulses of noise, of the transmitter's level"
+    )
+    odometer_error: Number = Field(
+        default=0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' error"
+    )
+
+    @model_validator(mode="after")
+    def _makes_a_signal(self) -> TrackCircuitPlan:
+        if self.sample_rate_hz % 128.0:
+            raise ValueError("sample_rate_hz: must be a multiple of 128 Hz")
+        if 2.0 * (max(self.carriers_hz) + 150.0) > self.sample_rate_hz:
+            raise ValueError(
+                "sample_rate_hz: must be twice the highest carrier and 150 Hz, or more"
+            )
+        known = load_profile(TRACK_CODE).carriers_hz
+        for index, carrier_hz in enumerate(self.carriers_hz):
+            if carrier_hz not in known:
+                raise ValueError(f"carriers_hz.{index}: {TRACK_CODE} has {known}")
+            if carrier_hz == self.carriers_hz[index - 1]:
+                raise ValueError(f"carriers_hz.{index}: neighbours need different carriers")
+        return self
+
+
 class TransponderPlan(Description):
     """The delay of the transponders on board, and how well the bench knows it."""
 
@@ -274,4 +342,19 @@ class Jam(_Fault):
     at_m: Chainage = Field(description="chainage it stands at [m]")
 
 
-Fault = Annotated[DeadStation | Jam, Field(discriminator="kind")]
+class Sanding(_Fault):
+    """Sand on the rails: a train picks up less."""
+
+    kind: Literal["sanding"]
+    train: Name = Field(description="the train that sands")
+    loss_db: Number = Field(default=60.0, ge=0.0, le=200.0, description="pick-up lost [dB]")
+
+
+class DeadTransmitter(_Fault):
+    """A track circuit that sends nothing."""
+
+    kind: Literal["dead_transmitter"]
+    circuit: Name = Field(description="its name: tc1, tc2, ... in the order of the tracks")
+
+
+Fault = Annotated[DeadStation | Jam | Sanding | DeadTransmitter, Field(discriminator="kind")]

@@ -39,6 +39,13 @@ def print_summary(scenario: Scenario, console: Console) -> None:
     console.print(table)
     if len(layout.zones) > _MOST_ZONES_SHOWN:
         console.print(f"... and {len(layout.zones) - _MOST_ZONES_SHOWN} more zones")
+    if scenario.circuits:
+        circuits = scenario.circuits
+        longest_m = max(circuit.length_m for circuit in circuits)
+        console.print(
+            f"{len(circuits)} track circuits up to {longest_m:.0f} m, "
+            f"{circuits[0].name} ... {circuits[-1].name}; trains obey their codes"
+        )
     for train in scenario.trains[:_MOST_ZONES_SHOWN]:
         console.print(
             f"train {train.name}: over {', '.join(train.route)} from {train.start_m:.0f} m, "

@@ -13,10 +13,14 @@ from typing import Any, get_type_hints
 
 from rail_msgs_py import topics
 from rail_msgs_py.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
+from rail_onboard.code_supervision_node import CodeSupervisionParameters
+from rail_onboard.track_code_receiver_node import TrackCodeReceiverParameters
 from rail_onboard.vrs_node import VrsParameters
+from rail_wayside.track_code_transmitter_node import TrackCodeTransmitterParameters
 from rail_wayside.wrs_node import WrsParameters
 from rail_wayside.zone_controller_node import ZoneControllerParameters
 from rail_world.radio_medium_node import RadioMediumParameters
+from rail_world.rail_medium_node import RailMediumParameters
 from rail_world.world_node import WorldParameters
 
 #: Kind of node, as in `rail_corridor.host.NODE_CLASSES`, and its parameters.
@@ -26,6 +30,10 @@ PARAMETERS: dict[str, Any] = {
     "wrs": WrsParameters,
     "zone_controller": ZoneControllerParameters,
     "vrs": VrsParameters,
+    "rail_medium": RailMediumParameters,
+    "track_code_transmitter": TrackCodeTransmitterParameters,
+    "track_code_receiver": TrackCodeReceiverParameters,
+    "code_supervision": CodeSupervisionParameters,
 }
 
 _INTRODUCTION = """\

@@ -14,11 +14,12 @@ from rail_world.radio_description import (
     RadioDescription,
     StationAntenna,
 )
+from rail_world.rail_description import Harmonic, RailDescription, RailFault, TrackCircuit
 from rail_world.world_file import WorldFile
 
 from .layout import Layout, Zone
 from .scenario import Scenario
-from .sections import DeadStation
+from .sections import DeadStation, DeadTransmitter, Jam, Sanding
 
 #: Antennas of a branching station look this far outward, so that their levels part at once.
 SQUINT_RAD = math.radians(25.0)
@@ -87,8 +88,13 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
         path_loss_exponent=plan.path_loss_exponent,
         noise_figure_db=plan.noise_figure_db,
         oscillator_ppm=plan.oscillator_ppm,
-        faults=tuple(_fault(scenario, fault) for fault in scenario.faults),
+        faults=tuple(
+            _fault(scenario, fault)
+            for fault in scenario.faults
+            if isinstance(fault, DeadStation | Jam)
+        ),
     )
+    codes = scenario.track_circuits
     return WorldFile(
         seed=scenario.seed,
         tick_s=scenario.tick_s,
@@ -96,6 +102,43 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
         junctions=scenario.junctions,
         trains=scenario.trains,
         radio=radio,
+        rails=rails_of(scenario),
+        odometer_error=0.0 if codes is None else codes.odometer_error,
+    )
+
+
+def rails_of(scenario: Scenario) -> RailDescription | None:
+    """The rails and their circuits, None where there are none."""
+    plan = scenario.track_circuits
+    if plan is None:
+        return None
+    # A wave of amplitude 1 over the noise in 300 Hz.
+    noise_v = math.sqrt(0.5 * plan.sample_rate_hz / 600.0) * 10.0 ** (-plan.snr_db / 20.0)
+    faults = [f for f in scenario.faults if isinstance(f, Sanding | DeadTransmitter)]
+    return RailDescription(
+        circuits=tuple(
+            TrackCircuit(
+                name=c.name,
+                track=c.track,
+                start_m=c.start_m,
+                end_m=c.end_m,
+                carrier_hz=c.carrier_hz,
+            )
+            for c in scenario.circuits
+        ),
+        trains=tuple(train.name for train in scenario.trains),
+        tracks=tuple(scenario.tracks),
+        sample_rate_hz=plan.sample_rate_hz,
+        attenuation_db_per_km=plan.attenuation_db_per_km,
+        joint_attenuation_db=plan.joint_db,
+        white_noise_v=noise_v,
+        impulse_rate_per_s=plan.impulses_per_s,
+        impulse_amplitude_v=1.0 if plan.impulses_per_s else 0.0,
+        harmonics=tuple(
+            Harmonic(order=order, amplitude_v=10.0 ** (level_db / 20.0))
+            for order, level_db in plan.harmonics
+        ),
+        faults=tuple(RailFault(**fault.model_dump()) for fault in faults),
     )
 
 

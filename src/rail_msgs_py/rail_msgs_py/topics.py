@@ -231,9 +231,83 @@ POSITION: Final = Topic(
     "Position of a train along its track by phase ranging; infinite variance = not known.",
 )
 
+CIRCUIT_TX: Final = Topic(
+    "/wayside/{circuit}/track_code/tx",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "track_code_transmitter",
+    "rail_medium",
+    "What a track circuit feeds into the rails in the tick: audio-frequency FM, real samples.",
+)
+CIRCUIT_RX: Final = Topic(
+    "/wayside/{circuit}/track_code/rx",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "rail_medium",
+    "track_code_transmitter",
+    "What arrives at the other end of the same circuit; next to nothing if axles are between.",
+)
+OCCUPANCY: Final = Topic(
+    "/wayside/{circuit}/track_code/occupancy",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "track_code_transmitter",
+    "the track_code_transmitters behind",
+    "Whether the circuit is occupied, from the level that arrives at its end.",
+)
+CODE_SENT: Final = Topic(
+    "/wayside/{circuit}/track_code/message",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "track_code_transmitter",
+    "people, the report",
+    "The message that the circuit sends: the word as a number, and its fields.",
+)
+CODE_RX: Final = Topic(
+    "/{train}/track_code/rx",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "rail_medium",
+    "track_code_receiver",
+    "What the antenna of a train ahead of its first axle picks up from the rails.",
+)
+CODE_RECEIVED: Final = Topic(
+    "/{train}/track_code/message",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "track_code_receiver",
+    "code_supervision, people, the report",
+    "The message understood on board: carrier in force, validity, the word and its fields.",
+)
+ODOMETER: Final = Topic(
+    "/{train}/odometer",
+    Float64MultiArray,
+    STREAM,
+    Table,
+    "world",
+    "code_supervision",
+    "What the wheels of a train count: distance and speed, with the error of their diameter.",
+)
+COMMAND: Final = Topic(
+    "/{train}/code_supervision/command",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "code_supervision",
+    "world, people, the report",
+    "What supervision on board permits and demands; it moves the train in the next tick.",
+)
+
 ALL: Final[tuple[Topic, ...]] = (
     *(CLOCK, STATE, TRUTH, LINKS, FINISHED, CORRIDOR_PATH, CORRIDOR_MARKERS, DONE, OBSERVED),
     *(READY, FAILED, DIAGNOSTICS, WRS_TX, WRS_RX, RANGE, VRS_RX, VRS_TX, VRS_CHANNEL, POSITION),
+    *(CIRCUIT_TX, CIRCUIT_RX, OCCUPANCY, CODE_SENT, CODE_RX, CODE_RECEIVED, ODOMETER, COMMAND),
 )
 
 STATE_COLUMNS: Final = (
@@ -241,6 +315,14 @@ STATE_COLUMNS: Final = (
     *("track_index", "chainage_m", "on_line"),
 )
 LINK_COLUMNS: Final = ("snr_down", "snr_up", "downlink_channel", "uplink_channel")
+OCCUPANCY_COLUMNS: Final = ("occupied", "level_db")
+SENT_COLUMNS: Final = ("word", "speed", "gradient", "block_length", "network")
+RECEIVED_COLUMNS: Final = (
+    *("carrier_hz", "valid", "word", "speed", "gradient", "block_length", "network"),
+    "level_db",
+)
+ODOMETER_COLUMNS: Final = ("distance_m", "speed_mps")
+COMMAND_COLUMNS: Final = ("permitted_mps", "warning", "service_brake", "emergency_brake")
 
 
 def kind_of(name: str) -> Topic | None:

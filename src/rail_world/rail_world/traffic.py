@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rail_world.drive_command import DriveCommand
 from rail_world.motion import TrainMotion
 from rail_world.network import Network
 from rail_world.route import Route
@@ -43,10 +44,18 @@ class Traffic:
         ]
         self._state = np.zeros((len(self._trains), 10))
 
-    def step(self) -> None:
-        """Move every train by one tick."""
-        for train in self._trains:
-            train.step()
+    def step(self, commands: Mapping[str, DriveCommand] | None = None) -> None:
+        """Move every train by one tick, under what supervision imposes on it by name."""
+        imposed = commands or {}
+        for name, train in zip(self.names, self._trains, strict=True):
+            train.step(imposed.get(name))
+
+    def travelled(self) -> dict[str, tuple[float, float]]:
+        """Distance travelled [m] and speed [m/s] of each train."""
+        return {
+            name: (train.distance_m, abs(train.speed_mps))
+            for name, train in zip(self.names, self._trains, strict=True)
+        }
 
     def state(self) -> NDArray[np.float64]:
         """The truth [train, column], columns as ``rail_msgs_py.topics.STATE_COLUMNS``.

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from rail_world.description import JunctionDescription, TrackDescription
 from rail_world.network import Network, build_network
 from rail_world.radio_description import RadioDescription
+from rail_world.rail_description import RailDescription
 from rail_world.train_description import TrainDescription
 
 
@@ -26,6 +27,10 @@ class WorldFile(BaseModel):
     junctions: tuple[JunctionDescription, ...] = ()
     trains: tuple[TrainDescription, ...]
     radio: RadioDescription
+    rails: RailDescription | None = None
+    odometer_error: float = Field(
+        0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' relative error"
+    )
 
     @property
     def tick_ns(self) -> int:

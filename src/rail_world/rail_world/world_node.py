@@ -1,16 +1,18 @@
 """The world: moves the trains, publishes the truth, and drives the ticks.
 
 Topics out: ``/clock``, ``/world/state``, ``/world/<train>/odometry``, ``/world/<track>/path``,
-``/world/markers``, ``/world/finished``. Topics in: ``<sink>/done``, ``/report/observed``,
-``/ready``, ``/failed``.
+``/world/markers``, ``/world/finished``, ``/<train>/odometer``. Topics in: ``<sink>/done``,
+``/<train>/code_supervision/command``, ``/report/observed``, ``/ready``, ``/failed``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Header
 
@@ -23,12 +25,14 @@ from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
 from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import TableWriter
+from rail_msgs_py.table import TableWriter, figures_from_cdr
 from rail_world.corridor_map import markers, path_of
+from rail_world.drive_command import DriveCommand
 from rail_world.traffic import Traffic
 from rail_world.world_file import read_world_file
 
 WATCH_PERIOD_S = 0.1
+_NOT_RECEIVED = DriveCommand(emergency_brake=True)
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,10 @@ class WorldParameters:
     sinks: tuple[str, ...] = parameter((), "full names of the nodes whose `done` ends a tick")
     clock_readers: int = parameter(0, "readers of the clock that must be connected first", low=0)
     end_when_arrived: bool = parameter(False, "whether to end once every train has arrived")
+    supervised: tuple[str, ...] = parameter((), "trains that wait for a command in every tick")
+    cab_signals: bool = parameter(
+        True, "whether drivers keep to the permitted speed before the brake makes them"
+    )
     observed: bool = parameter(False, "whether to stay within reach of the report")
     timeout_s: float = parameter(
         5.0, "wall time after which a sink is given up", unit="s", low=0.1, high=3600.0
@@ -85,9 +93,28 @@ class WorldNode(CorridorNode):
         self._truth = [self.publisher(topics.TRUTH, train=name).publish for name in names]
         self._truth_writers: dict[tuple[str, str], PositionWriter] = {}
         self._finish = self.publisher(topics.FINISHED)
-        self._inbox: TickInbox[None] = TickInbox(self._p.sinks)
-        owners = {sink: sink for sink in self._p.sinks}
-        self._watch = FailureWatch(self, owners, self._drop_sinks)
+        self._supervisors = {
+            train: topics.COMMAND.name(train=train).rpartition("/")[0]
+            for train in self._p.supervised
+        }
+        self._odometers = {
+            train: self.stream_out(topics.ODOMETER, train=train) for train in self._p.supervised
+        }
+        self._wheels = wheel_errors(described.seed, described.odometer_error, self._p.supervised)
+        self._odometer_tables = {
+            train: TableWriter((train,), topics.ODOMETER_COLUMNS) for train in self._p.supervised
+        }
+        # Until its first command a train stands: what is not received is not permitted.
+        self._commands = dict.fromkeys(self._p.supervised, _NOT_RECEIVED)
+        ports = (*self._p.sinks, *self._supervisors.values())
+        self._inbox: TickInbox[DriveCommand | None] = TickInbox(ports)
+        self._watch = FailureWatch(self, {port: port for port in ports}, self._drop_sinks)
+        for train, port in self._supervisors.items():
+            self.stream_in(
+                topics.COMMAND,
+                lambda raw, port=port: self._on_command(raw, port),
+                train=train,
+            )
         for sink in self._p.sinks:
             self.stream_in(topics.DONE, lambda raw, sink=sink: self._done(raw, sink), node=sink)
         if self._p.observed:
@@ -134,16 +161,25 @@ class WorldNode(CorridorNode):
             return
         self._tick += 1
         if self._tick > 0:
-            self._traffic.step()
+            self._traffic.step(self._commands)
         stamp_ns = self._tick * self._tick_ns
         self._begun_s = self.steady_s()
         state = self._traffic.state()
         self._state(self._state_table.write(stamp_ns, state))
         if stamp_ns % NANOSECONDS < self._tick_ns:
             self._publish_truth(stamp_ns)
+        self._publish_odometers(stamp_ns)
         self._clock(clock_to_cdr(stamp_ns))
-        if not self._p.sinks:
+        if not self._inbox.ports:
             self._tick_over()
+
+    def _publish_odometers(self, stamp_ns: int) -> None:
+        if not self._odometers:
+            return
+        travelled = self._traffic.travelled()
+        for train, publish in self._odometers.items():
+            figures = np.array([travelled[train]]) * (1.0 + self._wheels[train])
+            publish(self._odometer_tables[train].write(stamp_ns, figures))
 
     def _publish_truth(self, stamp_ns: int) -> None:
         for publish, (name, track, chainage_m, speed_mps) in zip(
@@ -157,10 +193,30 @@ class WorldNode(CorridorNode):
 
     def _done(self, raw: bytes, sink: str) -> None:
         self._inbox.put(clock_from_cdr(raw), sink, None)
+        self._advance()
+
+    def _on_command(self, raw: bytes, port: str) -> None:
+        stamp_ns, figures = figures_from_cdr(raw, 1, len(topics.COMMAND_COLUMNS))
+        permitted_mps, _, service_brake, emergency_brake = figures[0].tolist()
+        command = DriveCommand(
+            permitted_mps if self._p.cab_signals else inf,
+            service_brake=service_brake > 0.0,
+            emergency_brake=emergency_brake > 0.0,
+        )
+        self._inbox.put(stamp_ns, port, command)
+        self._advance()
+
+    def _advance(self) -> None:
         while self._inbox.complete:
-            stamp_ns, _ = self._inbox.take()
+            stamp_ns, items = self._inbox.take()
+            self._obey(items)
             if stamp_ns == self._tick * self._tick_ns:
                 self._tick_over()
+
+    def _obey(self, items: Mapping[str, DriveCommand | None]) -> None:
+        """Take the commands of a tick; a train whose supervision is silent brakes."""
+        for train, port in self._supervisors.items():
+            self._commands[train] = items.get(port) or _NOT_RECEIVED
 
     def _tick_over(self) -> None:
         self._begun_s = float("inf")
@@ -229,9 +285,14 @@ class WorldNode(CorridorNode):
         if self._tick < 0 or self._begun_s == float("inf"):
             return
         if self._inbox.complete or not self._inbox.awaits_anything:
-            if self._inbox.stamp_ns is not None:
-                self._inbox.take()
+            self._obey(self._inbox.take()[1] if self._inbox.stamp_ns is not None else {})
             self._tick_over()
+
+
+def wheel_errors(seed: int, sigma: float, trains: tuple[str, ...]) -> dict[str, float]:
+    """Relative error of each train's odometer: that of the diameter of its wheels."""
+    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 3])))
+    return {train: sigma * float(rng.standard_normal()) for train in trains}
 
 
 def main() -> None:

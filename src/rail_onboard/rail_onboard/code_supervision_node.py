@@ -1,0 +1,136 @@
+"""Speed supervision of a train: obeys the code in the rails, brakes where the driver does not.
+
+Topics in: ``track_code/message``, ``odometer``. Topics out: ``command``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from rail_msgs_py import topics
+from rail_msgs_py.failures import FailureWatch
+from rail_msgs_py.inbox import TickInbox
+from rail_msgs_py.node import Equipment
+from rail_msgs_py.parameters import declare, parameter
+from rail_msgs_py.standalone import run_node
+from rail_msgs_py.table import TableWriter, figures_from_cdr
+from rail_onboard.code_supervision import CodeSupervision
+
+WATCH_PERIOD_S = 0.1
+_CODE, _ODOMETER = "code", "odometer"
+_RECEIVED = {name: index for index, name in enumerate(topics.RECEIVED_COLUMNS)}
+_FIELDS = ("speed", "gradient", "block_length", "network")
+
+
+@dataclass(frozen=True)
+class CodeSupervisionParameters:
+    """Parameters of the supervision on board."""
+
+    braking_mps2: float = parameter(
+        0.5, "service braking that may be counted on", unit="m/s^2", low=0.05, high=5.0
+    )
+    odometer_error: float = parameter(
+        0.02, "relative error of distances that must be allowed for", low=0.0, high=0.5
+    )
+    timeout_s: float = parameter(
+        2.0, "wall time after which the receiver is given up", unit="s", low=0.05, high=3600.0
+    )
+
+
+class CodeSupervisionNode(Equipment):
+    """Speed supervision as a managed node; switched off it demands the emergency brake."""
+
+    def __init__(
+        self,
+        name: str = "code_supervision",
+        *,
+        namespace: str = "/train_1",
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
+        self._p = declare(self, CodeSupervisionParameters)
+        self._supervision = CodeSupervision(
+            braking_mps2=self._p.braking_mps2, odometer_error=self._p.odometer_error
+        )
+        train = namespace.strip("/")
+        self._publish = self.stream_out(topics.COMMAND, train=train)
+        self._table = TableWriter((train,), topics.COMMAND_COLUMNS)
+        self._inbox: TickInbox[Any] = TickInbox([_CODE, _ODOMETER])
+        receiver = topics.CODE_RECEIVED.name(train=train).rpartition("/")[0]
+        self._watch = FailureWatch(self, {_CODE: receiver}, self._drop)
+        self._waiting_since_s = float("inf")
+        self.stream_in(topics.CODE_RECEIVED, self._on_code, train=train)
+        self.stream_in(topics.ODOMETER, self._on_odometer, train=train)
+        self.every(WATCH_PERIOD_S, self._check)
+        self.announce_when_connected()
+
+    def _on_code(self, raw: bytes) -> None:
+        stamp_ns, figures = figures_from_cdr(raw, 1, len(topics.RECEIVED_COLUMNS))
+        self._inbox.put(stamp_ns, _CODE, figures[0].tolist())
+        self._advance()
+
+    def _on_odometer(self, raw: bytes) -> None:
+        stamp_ns, figures = figures_from_cdr(raw, 1, len(topics.ODOMETER_COLUMNS))
+        self._inbox.put(stamp_ns, _ODOMETER, figures[0].tolist())
+        self._waiting_since_s = self.steady_s()
+        self._advance()
+
+    def _advance(self) -> None:
+        while self._inbox.complete:
+            self._waiting_since_s = float("inf")
+            self._supervise(*self._inbox.take())
+
+    def _supervise(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        code, odometer = items.get(_CODE), items.get(_ODOMETER)
+        if odometer is None:
+            return
+        carrier_hz, fields = None, None
+        if code is not None and code[_RECEIVED["carrier_hz"]] > 0.0:
+            carrier_hz = code[_RECEIVED["carrier_hz"]]
+            if code[_RECEIVED["valid"]] > 0.0:
+                fields = {name: round(code[_RECEIVED[name]]) for name in _FIELDS}
+        distance_m, speed_mps = odometer
+        output = self._supervision.update(
+            stamp_ns * 1e-9, distance_m, speed_mps, fields=fields, carrier_hz=carrier_hz
+        )
+        emergency = output.emergency_brake or not self.switched_on
+        figures = [
+            output.permitted_mps,
+            float(output.warning),
+            float(output.service_brake),
+            float(emergency),
+        ]
+        self._publish(self._table.write(stamp_ns, np.array([figures])))
+        intervenes = emergency or output.service_brake
+        self.report(
+            DiagnosticStatus.WARN if intervenes else DiagnosticStatus.OK,
+            "supervision",
+            output.reason or "speed is within the code",
+            stamp_ns=stamp_ns,
+        )
+
+    def _check(self) -> None:
+        waited_s = self.steady_s() - self._waiting_since_s
+        if waited_s > self._p.timeout_s:
+            overdue = [port for port in self._inbox.missing if port == _CODE]
+            self._watch.give_up(overdue, self._p.timeout_s)
+
+    def _drop(self, ports: tuple[str, ...]) -> None:
+        self._inbox.drop(ports)
+        self._advance()
+
+
+def main() -> None:
+    """Run the supervision of a train on its own."""
+    run_node(CodeSupervisionNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -15,9 +15,7 @@ pytestmark = pytest.mark.system
 def _is_safe(train: dict[str, Any]) -> bool:
     """No wrong message, no overspeed, no block of another train entered."""
     code, atp = train["track_code"], train["atp"]
-    return bool(
-        code["wrong"] == 0 and atp["overspeed_s"] == 0.0 and atp["entered_occupied"] == 0
-    )
+    return bool(code["wrong"] == 0 and atp["overspeed_s"] == 0.0 and atp["entered_occupied"] == 0)
 
 
 def test_a_train_follows_another_through_blocks(rail: Rail) -> None:

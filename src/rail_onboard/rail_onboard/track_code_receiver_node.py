@@ -19,8 +19,8 @@ from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
 from rail_msgs_py.waveform import Waveform
 from rail_onboard.carrier_selector import CarrierSelector
-from rail_signals.track_code_profile import load_profile, profile_names
 from rail_signals.track_code_fast import FastTrackCodeReceiver
+from rail_signals.track_code_profile import load_profile, profile_names
 from rail_signals.track_code_word import as_number
 
 _FIELDS = ("speed", "gradient", "block_length", "network")

@@ -8,7 +8,8 @@ Compared are, each with 95 % Clopper-Pearson intervals:
 bound       `track_code_bound`: tones of unknown phase, decided one by one, from amplitudes of
             the Cramér-Rao covariance.
 ML          `track_code_ml`: fit of the whole slot, searched for from scratch in every slot.
-ML, near    the same fit started at the truth: what a perfect search would find near it.
+ML, near    the same fit started at the truth: what remains when the search never fails, as
+            with a start from the slot before.
 chain bits  the document's chain; a message is wrong if a level is on the wrong side of the
             middle between the windows.
 chain lost  the same with all its rules: windows, noise, CRC, two slots; lost is what is not
@@ -402,6 +403,12 @@ def measure(quick: bool = False) -> dict[str, object]:
         f" undetected wrong {undetected.chain_wrong.events} of {undetected.chain_wrong.trials}"
         f" [{undetected.chain_wrong.interval[1]:.1e}]"
     )
+    predicted = {
+        f"{db:.2f} dB Hz, {slots} slots": study.predicted_undetected(db, slots)
+        for db in (bound_db, half_db)
+        for slots in (1, 2)
+    }
+    print("undetected by closed form, efficient amplitudes:", predicted)
     noise = study.noise_only(1_000_000 // part)
     print("noise alone:", noise)
     return {
@@ -411,6 +418,7 @@ def measure(quick: bool = False) -> dict[str, object]:
         "equivalence": {k: asdict(v) if isinstance(v, Count) else v for k, v in same.items()},
         "half_lost_db_hz": half_db,
         "undetected": asdict(undetected),
+        "undetected_closed_form": predicted,
         "noise_only": noise,
     }
 

@@ -15,7 +15,7 @@ from rail_corridor.scenario import Overrides, load_scenario
 from rail_corridor.topic_docs import PARAMETERS, document, main, type_name
 from rail_msgs_py.topics import ALL, kind_of
 
-TICKS = 30
+TICKS = 12
 #: What rclpy itself offers beside the corridor's topics.
 ROS_OWN = ("/rosout", "/parameter_events")
 
@@ -30,8 +30,8 @@ class Corridor:
 
 
 def start(graph: Any, directory: Path) -> Corridor:
-    """Run three seconds of the branch, every node in this process, to the end."""
-    scenario = load_scenario("branch", overrides=Overrides(duration_s=0.1 * TICKS))
+    """Run a few ticks with every kind of node, all of them in this process, to the end."""
+    scenario = load_scenario("follow_codes", overrides=Overrides(duration_s=0.25 * TICKS))
     plan = make_plan(scenario, directory)
     nodes: dict[str, list[Any]] = {}
     for spec in plan.nodes:
@@ -45,8 +45,8 @@ def start(graph: Any, directory: Path) -> Corridor:
 
 def test_every_topic_is_documented_and_used_as_documented(graph: Any, tmp_path: Path) -> None:
     corridor = start(graph, tmp_path)
-    kinds = {spec.name.rpartition("/")[2]: spec.kind for spec in corridor.specs.values()}
-    kinds["report"] = "report"
+    kinds = {spec.name: spec.kind for spec in corridor.specs.values()}
+    kinds["/report"] = "report"
     seen = set()
     strangers = []
     for name, types in graph.bystander.get_topic_names_and_types():
@@ -64,7 +64,7 @@ def test_every_topic_is_documented_and_used_as_documented(graph: Any, tmp_path: 
                 assert end.qos_profile.reliability == topic.qos.reliability
                 assert end.qos_profile.durability == topic.qos.durability
                 if end.node_name != "bystander":
-                    kind = kinds[end.node_name]
+                    kind = kinds[f"{end.node_namespace.rstrip('/')}/{end.node_name}"]
                     if kind not in documented and "every node" not in documented:
                         strangers.append((name, role, kind))
     assert strangers == []

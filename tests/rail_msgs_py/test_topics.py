@@ -29,6 +29,7 @@ PARTS = {
     "train": ("train_1", "a", "world_2"),
     "site": ("wrs1", "zone_controller_2", "s"),
     "zone": ("zone1", "tx", "range"),
+    "circuit": ("tc1", "wrs1", "zone_controller"),
     "track": ("main", "markers", "path"),
     "channel": (1, 42),
     "node": ("/world/radio_medium", "/wayside/zone_controller"),

@@ -79,7 +79,7 @@ def test_own_estimator(rail: Rail) -> None:
 
 def test_switch_off_a_station(rail: Rail, listener: Listener) -> None:
     diagnostics = listener.listen(topics.DIAGNOSTICS)
-    corridor = rail.start("run", "plain_line", "--rate", 4, "--processes", "site")
+    corridor = rail.start("run", "plain_line", "--rate", 0.5, "--processes", "site")
     run = rail.start("wrs2", command=example("switch_off_a_station.py"))
     assert rail.finish(run) == 0, rail.errors(run)
     output = rail.output(run)

@@ -64,7 +64,13 @@ class Topic:
 
 
 CLOCK: Final = Topic(
-    "/clock", Clock, STREAM, None, "world", "wrs, zone_controller", "Start of a tick."
+    "/clock",
+    Clock,
+    STREAM,
+    None,
+    "world",
+    "wrs, zone_controller, track_code_transmitter",
+    "Start of a tick.",
 )
 STATE: Final = Topic(
     "/world/state",
@@ -72,7 +78,7 @@ STATE: Final = Topic(
     ESTIMATE,
     Table,
     "world",
-    "radio_medium, the report",
+    "radio_medium, rail_medium, the report",
     "The truth of the tick, one row per train: where its antenna is, how it moves. "
     "Equipment does not read it.",
 )
@@ -127,7 +133,7 @@ DONE: Final = Topic(
     Header,
     STREAM,
     None,
-    "radio_medium, zone_controller",
+    "radio_medium, rail_medium, zone_controller",
     "world",
     "The node has finished the tick of this stamp.",
 )
@@ -154,8 +160,10 @@ FAILED: Final = Topic(
     DiagnosticStatus,
     LATCHED,
     None,
-    "world, radio_medium, zone_controller, the report for the launcher",
-    "world, radio_medium, zone_controller, the report",
+    "every node that waits for others, the report for the launcher: world, radio_medium, "
+    "rail_medium, zone_controller, track_code_transmitter, code_supervision",
+    "world, radio_medium, rail_medium, zone_controller, track_code_transmitter, "
+    "code_supervision, the report",
     "A node that is not waited for any longer, and why.",
 )
 DIAGNOSTICS: Final = Topic(
@@ -232,7 +240,7 @@ POSITION: Final = Topic(
 )
 
 CIRCUIT_TX: Final = Topic(
-    "/wayside/{circuit}/track_code/tx",
+    "/wayside/{circuit}/track_code/feed_end",
     Float64MultiArray,
     STREAM,
     Waveform,
@@ -241,7 +249,7 @@ CIRCUIT_TX: Final = Topic(
     "What a track circuit feeds into the rails in the tick: audio-frequency FM, real samples.",
 )
 CIRCUIT_RX: Final = Topic(
-    "/wayside/{circuit}/track_code/rx",
+    "/wayside/{circuit}/track_code/relay_end",
     Float64MultiArray,
     STREAM,
     Waveform,

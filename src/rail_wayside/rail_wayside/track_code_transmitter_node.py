@@ -1,7 +1,7 @@
 """One track circuit: senses whether it is occupied, and sends a code for the train in it.
 
-Topics in: ``/clock``, ``rx``, ``occupancy`` of the circuits ahead. Topics out: ``tx``, ``message``,
-``occupancy``.
+Topics in: ``/clock``, ``relay_end``, ``occupancy`` of the circuits ahead. Topics out: ``feed_end``,
+``message``, ``occupancy``.
 
 What a circuit has sensed in one tick reaches those behind it in the next; until it does, and
 wherever it does not, they take it to be occupied.

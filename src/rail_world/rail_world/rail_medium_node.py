@@ -1,7 +1,7 @@
 """The rails as a node: takes what track circuits feed in, delivers what trains and circuits hear.
 
-Topics in: ``/world/state``, every circuit's ``feed_end``. Topics out: every circuit's ``relay_end``,
-every train's ``rx``, ``~/done``.
+Topics in: ``/world/state``, every circuit's ``feed_end``. Topics out: every circuit's
+``relay_end``, every train's ``rx``, ``~/done``.
 """
 
 from __future__ import annotations

@@ -22,11 +22,11 @@ from rail_signals.track_code_demodulator import Demodulator, DemodulatorChain
 from rail_signals.track_code_fast_demodulator import FastDemodulator
 from rail_signals.track_code_profile import SLOT_RATE_HZ, TrackCodeProfile
 from rail_signals.track_code_receiver import (
-    _CHANGE_OVER_NOISE,
+    CHANGE_OVER_NOISE,
     LOUDEST,
     MOST_AT_PEAK,
     TrackCodeReceiver,
-    _Word,
+    Word,
 )
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -244,7 +244,7 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
         parts = amplitudes * np.concatenate([bits, bits], axis=1)
         residual = _rms(slots - parts @ self._wave)
         change = _rms(slots[1:, -self._short :] - parts[:-1] @ self._next_wave)
-        limit = np.maximum(_CHANGE_OVER_NOISE * residual[:-1], self._least_change_hz)
+        limit = np.maximum(CHANGE_OVER_NOISE * residual[:-1], self._least_change_hz)
         goes_on = (bits[1:] == bits[:-1]).all(axis=1) & clear[1:] & ~(change > limit)
         bits.setflags(write=False)
         levels.setflags(write=False)
@@ -257,7 +257,7 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
         self._fresh += (stop - start) * self.hop_samples
         tones = self.profile.tones
         parts = steady.parts[stop - 1]
-        self._word = _Word(
+        self._word = Word(
             parts[:tones] + 1j * parts[tones:], self._now, float(steady.residual_hz[stop - 1])
         )
         times = np.arange(first, self._hops + 1) * self.hop_samples / SLOT_RATE_HZ

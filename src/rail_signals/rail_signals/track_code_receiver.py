@@ -35,13 +35,13 @@ MOST_AT_PEAK = 0.05
 LOUDEST = 1e6
 """Sample magnitude beyond which the input is taken for broken."""
 
-_CHANGE_OVER_NOISE = 4.0
+CHANGE_OVER_NOISE = 4.0
 # A new word differs in several tones; a third of the weakest one, in root mean square.
 _CHANGE_OF_WEAKEST = 0.35
 
 
 @dataclass(frozen=True)
-class _Word:
+class Word:
     """The word in force: present tones at one instant."""
 
     amplitudes: ComplexArray
@@ -185,7 +185,7 @@ class TrackCodeReceiver:
     def _restart(self, fresh: int) -> None:
         """Begin a new long slot, of which so many samples are there already."""
         self._fresh = fresh
-        self._word: _Word | None = None
+        self._word: Word | None = None
         self._confirmation.reset()
 
     def _decide(self) -> Decision:
@@ -201,7 +201,7 @@ class TrackCodeReceiver:
         else:
             present = np.where(bits, amplitudes, 0)
             left = self._slot - (self._model @ present).real
-            self._word = _Word(present, self._now, float(np.sqrt(np.mean(left * left))))
+            self._word = Word(present, self._now, float(np.sqrt(np.mean(left * left))))
         valid = not reason
         return Decision(self.time_s, bits, levels, valid, fields if valid else None, reason)
 
@@ -214,7 +214,7 @@ class TrackCodeReceiver:
         turn = np.exp(2j * math.pi * elapsed_s * np.array(self.profile.tones_hz))
         left = self._slot[-self._short :] - (self._continued @ (word.amplitudes * turn)).real
         residual_hz = float(np.sqrt(np.mean(left * left)))
-        return residual_hz > max(_CHANGE_OVER_NOISE * word.residual_hz, self._least_change_hz)
+        return residual_hz > max(CHANGE_OVER_NOISE * word.residual_hz, self._least_change_hz)
 
     @property
     def _now(self) -> int:

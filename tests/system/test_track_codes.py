@@ -34,11 +34,11 @@ def test_a_train_follows_another_through_blocks(rail: Rail) -> None:
 
 
 def test_a_heedless_driver_is_braked(rail: Rail) -> None:
-    report = rail.report("heedless_driver", "--duration", 170)
+    report = rail.report("heedless_driver", "--duration", 140)
     follower = report["trains"]["follower"]
     assert _is_safe(follower)
-    assert follower["distance_m"] > 800.0
-    assert follower["atp"]["interventions"] > 3
+    assert follower["distance_m"] > 300.0
+    assert follower["atp"]["interventions"] > 1
     assert follower["atp"]["emergency_brakes"] == 0
     assert follower["atp"]["margin_min_m"] > 400.0
 

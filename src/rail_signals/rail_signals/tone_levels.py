@@ -99,7 +99,7 @@ def noise_covariance(spectrum: NoiseSpectrum | None, rate_hz: float, samples: in
     points = max(_SPECTRUM_POINTS, 8 * samples)
     frequency = np.linspace(0.0, rate_hz / 2, points + 1)
     density = np.asarray(spectrum(frequency), dtype=np.float64)
-    if density.shape != frequency.shape or not np.isfinite(density).all() or density.min() < 0:
+    if density.shape != frequency.shape or not np.isfinite(density).all() or np.min(density) < 0:
         raise ValueError("noise_spectrum must return a finite density from zero per frequency")
     # An even spectrum: its inverse transform is the trapezoidal rule of the integral above.
     lags = np.fft.irfft(density)[:samples]

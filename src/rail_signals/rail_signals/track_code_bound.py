@@ -215,7 +215,10 @@ def snr_of_message_error(
         return float(np.log1p(-p).sum() - math.log1p(-rate))
 
     # From ratios of 1 for the best tone to 40 for the worst.
-    low, high = 20 * math.log10(1 / ratio.max()), 20 * math.log10(40 / ratio.min())
+    low, high = (
+        20 * math.log10(1 / float(np.max(ratio))),
+        20 * math.log10(40 / float(np.min(ratio))),
+    )
     return float(10 ** (brentq(excess, low, high, xtol=1e-6) / 10))
 
 

@@ -100,7 +100,7 @@ def judge_levels(
         tone = int(doubtful[0])
         frequency = profile.tones_hz[tone]
         return bits, None, f"level {level[tone]:.2f} of tone {frequency:g} Hz is in no window"
-    worst = float(np.max(noise))
+    worst = float(np.max(np.asarray(noise, dtype=np.float64)))
     if not worst <= MOST_NOISE:
         return bits, None, f"noise of the levels is {worst:.2f}, more than {MOST_NOISE:g}"
     fields = decode(profile, bits)

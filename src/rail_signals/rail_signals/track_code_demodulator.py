@@ -156,7 +156,7 @@ class DemodulatorChain:
             source = frequency**2 + _WHITE_BELOW_HZ**2
             whole = self._before_rejecter(frequency) * self._at_demodulated_rate(frequency)
             folded += source * np.abs(whole) ** 2
-        return np.asarray(folded + _MODEL_FLOOR * folded.max(), dtype=np.float64)
+        return np.asarray(folded + _MODEL_FLOOR * np.max(folded), dtype=np.float64)
 
     def rejecter_modes(self, samples: int) -> FloatArray:
         """Natural oscillation of the DC rejecter at 64 Hz, float64 [samples, 2].

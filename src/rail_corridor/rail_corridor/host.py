@@ -56,9 +56,15 @@ def make_node(spec: NodeSpec, context: Any, services: bool) -> Any:
 
 
 def make_nodes(specs: Sequence[NodeSpec], context: Any) -> list[Any]:
-    """Create the nodes of one process; many of them go without parameter services."""
+    """Create the nodes of one process; many of them go without parameter services.
+
+    What is there by then stays: no need to look through it for garbage again.
+    """
     services = len(specs) <= MOST_NODES_WITH_SERVICES
-    return [make_node(spec, context, services) for spec in specs]
+    nodes = [make_node(spec, context, services) for spec in specs]
+    gc.collect()
+    gc.freeze()
+    return nodes
 
 
 def run_nodes(specs: Sequence[NodeSpec]) -> None:
@@ -71,8 +77,6 @@ def run_nodes(specs: Sequence[NodeSpec]) -> None:
     context = rclpy.Context()
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     nodes = make_nodes(specs, context)
-    gc.collect()
-    gc.freeze()
     try:
         spin(context, nodes)
     finally:

@@ -151,9 +151,6 @@ class _Run:
         executor = EventsExecutor(context=context)
         for node in nodes:
             executor.add_node(node)
-        # What is here now stays: no need to look through it for garbage again.
-        gc.collect()
-        gc.freeze()
         with Progress(
             TextColumn("{task.description}"),
             BarColumn(bar_width=None),

@@ -8,6 +8,9 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from rail_msgs_py import topics
+from rail_msgs_py.inbox import TickInbox
+
+WATCH_PERIOD_S = 0.1
 
 
 def failure(node: str, reason: str, detected_by: str) -> DiagnosticStatus:
@@ -67,3 +70,51 @@ class FailureWatch:
         reason = f"no answer within {waited_s:.1f} s"
         for node in nodes:
             self._publisher.publish(failure(node, reason, self._node.get_fully_qualified_name()))
+
+
+class TickWatch(FailureWatch):
+    """Gives up the ports that one inbox waits for too long in a tick.
+
+    Parameters
+    ----------
+    node : CorridorNode
+        The node that waits.
+    inbox : TickInbox
+    owners : dict
+        Port to the fully qualified name of the node that sends it. A port that is missing here,
+        such as the clock, is waited for for ever.
+    timeout_s : float
+        Wall time from `begin` until ports are given up.
+    advance : callable
+        Takes what is complete; called when ports have been dropped.
+    """
+
+    def __init__(
+        self,
+        node: Any,
+        inbox: TickInbox[Any],
+        owners: dict[str, str],
+        timeout_s: float,
+        advance: Callable[[], None],
+    ) -> None:
+        super().__init__(node, owners, self._drop)
+        self._inbox, self._timeout_s, self._advance = inbox, timeout_s, advance
+        self._begun_s = float("inf")
+        node.every(WATCH_PERIOD_S, self._check)
+
+    def begin(self) -> None:
+        """Start the clock: a tick is under way."""
+        self._begun_s = self._node.steady_s()
+
+    def end(self) -> None:
+        """Stop the clock: the tick has been taken."""
+        self._begun_s = float("inf")
+
+    def _check(self) -> None:
+        if self._node.steady_s() - self._begun_s > self._timeout_s:
+            overdue = [port for port in self._inbox.missing if port in self._owners]
+            self.give_up(overdue, self._timeout_s)
+
+    def _drop(self, ports: tuple[str, ...]) -> None:
+        self._inbox.drop(ports)
+        self._advance()

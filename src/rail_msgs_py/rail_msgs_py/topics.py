@@ -57,6 +57,14 @@ class Topic:
         """
         return self.pattern.format(**parts)
 
+    def owner(self, **parts: object) -> str:
+        """Full name of the node that sends it, where the topic is named below its node.
+
+        >>> OCCUPANCY.owner(circuit="tc1")
+        '/wayside/tc1/track_code'
+        """
+        return self.name(**parts).rpartition("/")[0]
+
     def matches(self, name: str) -> bool:
         """Whether ``name`` is of this kind."""
         expression = re.sub(r"\\\{\w+\\\}", r"[^/]+", re.escape(self.pattern))

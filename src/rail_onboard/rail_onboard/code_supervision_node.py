@@ -13,7 +13,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py import topics
-from rail_msgs_py.failures import FailureWatch
+from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import Equipment
 from rail_msgs_py.parameters import declare, parameter
@@ -21,7 +21,6 @@ from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter, figures_from_cdr
 from rail_onboard.code_supervision import CodeSupervision
 
-WATCH_PERIOD_S = 0.1
 _CODE, _ODOMETER = "code", "odometer"
 _RECEIVED = {name: index for index, name in enumerate(topics.RECEIVED_COLUMNS)}
 _FIELDS = ("speed", "gradient", "block_length", "network")
@@ -63,12 +62,12 @@ class CodeSupervisionNode(Equipment):
         self._publish = self.stream_out(topics.COMMAND, train=train)
         self._table = TableWriter((train,), topics.COMMAND_COLUMNS)
         self._inbox: TickInbox[Any] = TickInbox([_CODE, _ODOMETER])
-        receiver = topics.CODE_RECEIVED.name(train=train).rpartition("/")[0]
-        self._watch = FailureWatch(self, {_CODE: receiver}, self._drop)
-        self._waiting_since_s = float("inf")
+        receiver = topics.CODE_RECEIVED.owner(train=train)
+        self._watch = TickWatch(
+            self, self._inbox, {_CODE: receiver}, self._p.timeout_s, self._advance
+        )
         self.stream_in(topics.CODE_RECEIVED, self._on_code, train=train)
         self.stream_in(topics.ODOMETER, self._on_odometer, train=train)
-        self.every(WATCH_PERIOD_S, self._check)
         self.announce_when_connected()
 
     def _on_code(self, raw: bytes) -> None:
@@ -79,12 +78,12 @@ class CodeSupervisionNode(Equipment):
     def _on_odometer(self, raw: bytes) -> None:
         stamp_ns, figures = figures_from_cdr(raw, 1, len(topics.ODOMETER_COLUMNS))
         self._inbox.put(stamp_ns, _ODOMETER, figures[0].tolist())
-        self._waiting_since_s = self.steady_s()
+        self._watch.begin()
         self._advance()
 
     def _advance(self) -> None:
         while self._inbox.complete:
-            self._waiting_since_s = float("inf")
+            self._watch.end()
             self._supervise(*self._inbox.take())
 
     def _supervise(self, stamp_ns: int, items: dict[str, Any]) -> None:
@@ -115,16 +114,6 @@ class CodeSupervisionNode(Equipment):
             output.reason or "speed is within the code",
             stamp_ns=stamp_ns,
         )
-
-    def _check(self) -> None:
-        waited_s = self.steady_s() - self._waiting_since_s
-        if waited_s > self._p.timeout_s:
-            overdue = [port for port in self._inbox.missing if port == _CODE]
-            self._watch.give_up(overdue, self._p.timeout_s)
-
-    def _drop(self, ports: tuple[str, ...]) -> None:
-        self._inbox.drop(ports)
-        self._advance()
 
 
 def main() -> None:

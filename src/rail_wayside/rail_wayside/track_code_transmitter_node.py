@@ -18,7 +18,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py import topics
-from rail_msgs_py.failures import FailureWatch
+from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import Equipment
 from rail_msgs_py.parameters import ParameterError, declare, parameter
@@ -32,7 +32,6 @@ from rail_signals.track_code_signal import FmTransmitter
 from rail_signals.track_code_word import as_number, encode
 from rail_wayside.code_logic import Block, CodeLogic
 
-WATCH_PERIOD_S = 0.1
 _CLOCK_PORT = "clock"
 #: A shunted circuit is this far below the level of a clear one at least [dB].
 OCCUPIED_BELOW_DB = 12.0
@@ -105,12 +104,10 @@ class TrackCodeTransmitterNode(Equipment):
                 lambda raw, circuit=circuit: self._on_occupancy(circuit, raw),
                 circuit=circuit,
             )
-        owners = {c: topics.OCCUPANCY.name(circuit=c).rpartition("/")[0] for c in p.ahead}
-        self._watch = FailureWatch(self, owners, self._drop)
-        self._waiting_since_s = float("inf")
+        owners = {c: topics.OCCUPANCY.owner(circuit=c) for c in p.ahead}
+        self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
         self.stream_in(topics.CIRCUIT_RX, self._on_block, circuit=self._circuit)
         self.stream_in(topics.CLOCK, self._on_clock)
-        self.every(WATCH_PERIOD_S, self._check)
         self.announce_when_connected()
 
     def _check_parameters(self) -> None:
@@ -127,7 +124,7 @@ class TrackCodeTransmitterNode(Equipment):
 
     def _on_clock(self, raw: bytes) -> None:
         self._inbox.put(clock_from_cdr(raw), _CLOCK_PORT, None)
-        self._waiting_since_s = self.steady_s()
+        self._watch.begin()
         self._advance()
 
     def _on_occupancy(self, circuit: str, raw: bytes) -> None:
@@ -137,7 +134,7 @@ class TrackCodeTransmitterNode(Equipment):
 
     def _advance(self) -> None:
         while self._inbox.complete:
-            self._waiting_since_s = float("inf")
+            self._watch.end()
             self._transmit(*self._inbox.take())
 
     def _transmit(self, stamp_ns: int, items: dict[str, bool | None]) -> None:
@@ -174,16 +171,6 @@ class TrackCodeTransmitterNode(Equipment):
             "occupied" if occupied else "clear",
             stamp_ns=stamp_ns,
         )
-
-    def _check(self) -> None:
-        waited_s = self.steady_s() - self._waiting_since_s
-        if waited_s > self._p.timeout_s:
-            overdue = [port for port in self._inbox.missing if port != _CLOCK_PORT]
-            self._watch.give_up(overdue, self._p.timeout_s)
-
-    def _drop(self, circuits: tuple[str, ...]) -> None:
-        self._inbox.drop(circuits)
-        self._advance()
 
 
 def main() -> None:

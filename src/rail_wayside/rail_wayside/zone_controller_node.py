@@ -14,7 +14,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py import topics
-from rail_msgs_py.failures import FailureWatch
+from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
@@ -26,7 +26,6 @@ from rail_msgs_py.standalone import run_node
 from rail_wayside.zone_map import Zone, ZoneMap
 from rail_wayside.zone_tracking import NOT_HEARD, Fix, Reading, ZoneTracker
 
-WATCH_PERIOD_S = 0.1
 _CLOCK_PORT = "clock"
 
 
@@ -110,8 +109,7 @@ class ZoneControllerNode(CorridorNode):
         owners = {zone.name: f"/wayside/{zone.site}" for zone in zone_map.zones.values()}
         # The clock is a port like the others: a tick ends though no station answers.
         self._inbox: TickInbox[Reading | None] = TickInbox([*owners, _CLOCK_PORT])
-        self._watch = FailureWatch(self, owners, self._drop)
-        self._waiting_since_s = float("inf")
+        self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
         for zone in zone_map.zones.values():
             self.stream_in(
                 topics.RANGE,
@@ -121,12 +119,11 @@ class ZoneControllerNode(CorridorNode):
             )
         self.stream_in(topics.CLOCK, self._on_clock)
         self._done = self.stream_out(topics.DONE, node=self.get_fully_qualified_name())
-        self.every(WATCH_PERIOD_S, self._check)
         self.announce_when_connected()
 
     def _on_clock(self, raw: bytes) -> None:
         self._inbox.put(clock_from_cdr(raw), _CLOCK_PORT, None)
-        self._waiting_since_s = self.steady_s()
+        self._watch.begin()
         self._advance()
 
     def _on_range(self, zone: str, raw: bytes) -> None:
@@ -141,7 +138,7 @@ class ZoneControllerNode(CorridorNode):
 
     def _tick_over(self) -> None:
         stamp_ns, readings = self._inbox.take()
-        self._waiting_since_s = float("inf")
+        self._watch.end()
         fixes = self._tracker.update(
             stamp_ns * 1e-9,
             {zone: reading for zone, reading in readings.items() if reading is not None},
@@ -176,16 +173,6 @@ class ZoneControllerNode(CorridorNode):
             f"unidentified train in {unknown}" if unknown else "every train is identified",
             stamp_ns=stamp_ns,
         )
-
-    def _check(self) -> None:
-        waited_s = self.steady_s() - self._waiting_since_s
-        if waited_s > self._p.timeout_s:
-            overdue = [port for port in self._inbox.missing if port != _CLOCK_PORT]
-            self._watch.give_up(overdue, self._p.timeout_s)
-
-    def _drop(self, zones: tuple[str, ...]) -> None:
-        self._inbox.drop(zones)
-        self._advance()
 
 
 def main() -> None:

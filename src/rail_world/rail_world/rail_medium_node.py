@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_msgs_py import topics
-from rail_msgs_py.failures import FailureWatch
+from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
@@ -25,7 +25,6 @@ from rail_msgs_py.waveform import BlockReader, Waveform
 from rail_world.rail_medium import RailMedium, TrainsOnRails
 from rail_world.world_file import read_world_file
 
-WATCH_PERIOD_S = 0.1
 _STATE_PORT = "state"
 _STATE = {name: index for index, name in enumerate(topics.STATE_COLUMNS)}
 
@@ -65,10 +64,10 @@ class RailMediumNode(CorridorNode):
         self._trains = [train.name for train in described.trains]
         self._ports: list[str] = []
         self._circuit_out: list[Callable[[bytes], None]] = []
-        owners = {_STATE_PORT: "/world"}
+        owners: dict[str, str] = {}
         for circuit in described.rails.circuits:
             port = topics.CIRCUIT_TX.name(circuit=circuit.name)
-            owners[port] = port.rpartition("/")[0]
+            owners[port] = topics.CIRCUIT_TX.owner(circuit=circuit.name)
             self._ports.append(port)
             self._circuit_out.append(self.stream_out(topics.CIRCUIT_RX, circuit=circuit.name))
             self.stream_in(
@@ -79,17 +78,15 @@ class RailMediumNode(CorridorNode):
         self._train_out = [self.stream_out(topics.CODE_RX, train=name) for name in self._trains]
         self._readers = {port: BlockReader() for port in self._ports}
         self._inbox: TickInbox[Any] = TickInbox([_STATE_PORT, *self._ports])
-        self._watch = FailureWatch(self, owners, self._drop)
+        self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
         self.stream_in(topics.STATE, self._on_state)
         self._done = self.stream_out(topics.DONE, node=self.get_fully_qualified_name())
-        self._waiting_since_s = float("inf")
-        self.every(WATCH_PERIOD_S, self._check)
         self.announce_when_connected()
 
     def _on_state(self, raw: bytes) -> None:
         stamp_ns, state = figures_from_cdr(raw, len(self._trains), len(topics.STATE_COLUMNS))
         self._inbox.put(stamp_ns, _STATE_PORT, state)
-        self._waiting_since_s = self.steady_s()
+        self._watch.begin()
         self._advance()
 
     def _on_block(self, port: str, raw: bytes) -> None:
@@ -102,7 +99,7 @@ class RailMediumNode(CorridorNode):
             self._deliver(*self._inbox.take())
 
     def _deliver(self, stamp_ns: int, items: dict[str, Any]) -> None:
-        self._waiting_since_s = float("inf")
+        self._watch.end()
         state = items.get(_STATE_PORT)
         if state is None:
             return
@@ -131,16 +128,6 @@ class RailMediumNode(CorridorNode):
         return Waveform(
             stamp_ns, self._rails.sample_rate_hz, 0.0, 0, samples[None].astype(np.complex128)
         ).to_cdr()
-
-    def _check(self) -> None:
-        waited_s = self.steady_s() - self._waiting_since_s
-        if waited_s > self._p.timeout_s:
-            overdue = [port for port in self._inbox.missing if port != _STATE_PORT]
-            self._watch.give_up(overdue, self._p.timeout_s)
-
-    def _drop(self, ports: tuple[str, ...]) -> None:
-        self._inbox.drop(port for port in ports if port != _STATE_PORT)
-        self._advance()
 
 
 def main() -> None:

@@ -8,16 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-_WORD = np.float32(2.0**-32)
-_TURN = np.float32(2.0 * math.pi * 2.0**-32)
+from rail_world.noise import TURN, WORD, PlacedWords
 
 
 class RealNoiseSource:
     """Real noise that depends on nothing but (seed, stage, port, tick).
 
-    The real sister of `rail_world.noise.NoiseSource`, on a stream of its own: a counter-based
-    generator is set to a place of its own for each block. One 64-bit word makes two normals
-    (Box and Muller, 1958), in single precision; the tails reach to 6.6 sigma.
+    The real sister of `rail_world.noise.NoiseSource`, on a stream of its own. One 64-bit word
+    makes two normals (Box and Muller, 1958), in single precision; the tails reach to 6.6 sigma.
 
     Parameters
     ----------
@@ -27,20 +25,19 @@ class RealNoiseSource:
     """
 
     def __init__(self, seed: int, samples: int) -> None:
-        self._bits = np.random.Philox(np.random.SeedSequence([seed, 4]))
-        self._state = self._bits.state
+        self._words = PlacedWords(seed, 4)
         self._samples = samples
 
     def blocks(self, stage: int, ports: Sequence[int], tick: int) -> NDArray[np.float32]:
         """White Gaussian noise [port, sample] with a variance of 1."""
         half = (self._samples + 1) // 2
-        halves = self._words(stage, ports, tick, half).view(np.uint32).astype(np.float32)
+        halves = self._words.draw(stage, ports, tick, half).view(np.uint32).astype(np.float32)
         # From (0, 2^32]: a logarithm of zero would be infinite.
         radius = halves[:, :half]
         radius += np.float32(0.5)
-        radius *= _WORD
+        radius *= WORD
         radius = np.sqrt(np.float32(-2.0) * np.log(radius))
-        angle = halves[:, half:] * _TURN
+        angle = halves[:, half:] * TURN
         noise = np.concatenate((radius * np.cos(angle), radius * np.sin(angle)), axis=1)
         return noise[:, : self._samples]
 
@@ -64,21 +61,10 @@ class RealNoiseSource:
         """
         # Eight sigma past the mean: more have no place, and do not come.
         most = math.ceil(mean_count + 8.0 * math.sqrt(mean_count)) + 8
-        words = self._words(stage, ports, tick, 2 * most)
+        words = self._words.draw(stage, ports, tick, 2 * most)
         uniform = ((words >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
         exponential = -np.log(uniform)
         at = np.cumsum(exponential[:, :most], axis=1) * (self._samples / mean_count)
         row, column = np.nonzero(at < self._samples)
         sign = np.where(words[row, most + column] & np.uint64(1), 1.0, -1.0)
         return row, at[row, column].astype(np.intp), sign * exponential[row, most + column]
-
-    def _words(self, stage: int, ports: Sequence[int], tick: int, count: int) -> NDArray[np.uint64]:
-        """Random words [port, word] of a place."""
-        state = self._state
-        words = np.empty((len(ports), count), dtype=np.uint64)
-        for row, port in zip(words, ports, strict=True):
-            state["state"]["counter"][:] = (0, stage, port, tick)
-            state["buffer_pos"] = 4
-            self._bits.state = state
-            row[:] = self._bits.random_raw(count)
-        return words

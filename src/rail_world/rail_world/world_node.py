@@ -94,8 +94,7 @@ class WorldNode(CorridorNode):
         self._truth_writers: dict[tuple[str, str], PositionWriter] = {}
         self._finish = self.publisher(topics.FINISHED)
         self._supervisors = {
-            train: topics.COMMAND.name(train=train).rpartition("/")[0]
-            for train in self._p.supervised
+            train: topics.COMMAND.owner(train=train) for train in self._p.supervised
         }
         self._odometers = {
             train: self.stream_out(topics.ODOMETER, train=train) for train in self._p.supervised

@@ -13,8 +13,7 @@ detection that their conclusion asks for. A word is valid if
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,22 +23,22 @@ from rail_signals.track_code_word import decode
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
+Number = TypeVar("Number", bound=np.generic)
 
 MOST_NOISE = 0.1
 """Largest standard deviation of a level, as a fraction of the tone's nominal deviation."""
 
 
-@dataclass(frozen=True, eq=False)
-class Decision:
+class Decision(NamedTuple):
     """What a receiver makes of the signal up to one instant.
 
     Attributes
     ----------
     time_s
         Time of the newest sample considered, from the first one fed [s].
-    bits : bool [tones]
+    bits : bool [tones], read-only
         Tones present, level above the middle between the windows; False without levels.
-    levels : float64 [tones]
+    levels : float64 [tones], read-only
         Deviation of each tone over the nominal one; NaN while there is no full slot.
     valid
         Whether the word counts.
@@ -56,16 +55,18 @@ class Decision:
     fields: Mapping[str, int] | None
     reason: str
 
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        self.bits.setflags(write=False)
-        self.levels.setflags(write=False)
-
 
 def no_slot(profile: TrackCodeProfile, time_s: float, reason: str) -> Decision:
     """Decision without levels."""
     bits = np.zeros(profile.tones, dtype=np.bool_)
-    return Decision(time_s, bits, np.full(profile.tones, np.nan), False, None, reason)
+    levels = np.full(profile.tones, np.nan)
+    return Decision(time_s, read_only(bits), read_only(levels), False, None, reason)
+
+
+def read_only(array: NDArray[Number]) -> NDArray[Number]:
+    """The array itself, no longer to be written."""
+    array.setflags(write=False)
+    return array
 
 
 def judge_levels(

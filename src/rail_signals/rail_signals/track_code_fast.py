@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import repeat
 from typing import TypeAlias
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
-from rail_signals.track_code_decision import MOST_NOISE, Decision, no_slot
-from rail_signals.track_code_demodulator import Demodulator, DemodulatorChain
+from rail_signals.track_code_decision import MOST_NOISE, Decision, no_slot, read_only
 from rail_signals.track_code_fast_demodulator import FastDemodulator
 from rail_signals.track_code_profile import SLOT_RATE_HZ, TrackCodeProfile
 from rail_signals.track_code_receiver import (
@@ -27,6 +27,7 @@ from rail_signals.track_code_receiver import (
     MOST_AT_PEAK,
     TrackCodeReceiver,
     Word,
+    input_fault,
 )
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -35,9 +36,8 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 BoolArray: TypeAlias = NDArray[np.bool_]
 RealArray: TypeAlias = NDArray[np.floating]
 
-_BATCH_HOPS = 512
+_BATCH_HOPS = 1024
 _PIECE_BYTES = 1 << 17
-_FAULTLESS = np.linspace(0.5, 1.0, 64)
 
 
 @dataclass(frozen=True)
@@ -61,22 +61,6 @@ class _Steady:
     levels: FloatArray
     parts: SingleArray
     residual_hz: SingleArray
-
-
-class _Replay(Demodulator):
-    """Stands for the demodulator of `TrackCodeReceiver`: gives out what is known already."""
-
-    def __init__(self, chain: DemodulatorChain, hop_samples: int) -> None:
-        self.fast = FastDemodulator(chain, hop_samples)
-        self.next: tuple[FloatArray, float] = (np.zeros(0), 0.0)
-
-    def reset(self) -> None:
-        """Forget what was received so far."""
-        self.fast.reset()
-
-    def frame(self, samples: FloatArray) -> tuple[FloatArray, float]:
-        """Result of the hop whose turn it is; the samples went through the filters before."""
-        return self.next
 
 
 class FastTrackCodeReceiver(TrackCodeReceiver):
@@ -114,23 +98,26 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
             confirmations=confirmations,
             least_amplitude=least_amplitude,
         )
-        self._demodulator = self._replay = _Replay(self.chain, self.hop_samples)
+        self._fast_demodulator = FastDemodulator(self.chain, self.hop_samples)
         matrix = self._estimator.matrix
         # Amplitudes and residuals of a slot in one product.
         measure = np.concatenate([matrix.real, matrix.imag, self._estimator.whitener])
         self._measure = np.ascontiguousarray(measure.T, dtype=np.float32)
         self._worst_spread = float(np.max(self._estimator.spread / self._deviations))
-        self._nothing = no_slot(profile, 0.0, "")
+        nothing = no_slot(profile, 0.0, "")
+        self._nothing = nothing.bits, nothing.levels
         # One hop on, the tones of a word have turned.
         turn = np.exp(2j * math.pi * self.hop_samples / SLOT_RATE_HZ * np.array(profile.tones_hz))
         self._wave = _real_rows(self._model)
         self._next_wave = _real_rows(self._continued * turn)
+        self._valid = False
+        self._fields: Mapping[str, int] | None = None
 
     def reset(self) -> None:
         """Forget everything received; the next sample is the first."""
         super().reset()
-        self._valid = False
-        self._fields: Mapping[str, int] | None = None
+        self._fast_demodulator.reset()
+        self._valid, self._fields = False, None
 
     def feed(self, samples: ArrayLike) -> list[Decision]:
         """Receive the next samples; as `TrackCodeReceiver.feed`."""
@@ -162,7 +149,7 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
         """Decisions of a batch of hops [hops, frame]."""
         hops = len(frames)
         decimated, faulty = self._decimated(frames)
-        demodulated, amplitude = self._replay.fast.demodulate(decimated, hops)
+        demodulated, amplitude = self._fast_demodulator.demodulate(decimated, hops)
         stream = np.concatenate([self._slot, demodulated.ravel()])
         # The first is the slot before the batch.
         every = sliding_window_view(stream, self._slot.size)[:: self.hop_samples]
@@ -180,10 +167,8 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
                     continue
                 self._valid = False
                 self._slot = every[k]
-                # The stage looks for faults in the samples: spare it those without.
-                frame = frames[k].astype(np.float64) if faulty[k] else _FAULTLESS
-                self._replay.next = demodulated[k], float(amplitude[k])
-                decision = self._hop(frame)
+                fault = input_fault(frames[k]) if faulty[k] else ""
+                decision = self._take(fault, demodulated[k], float(amplitude[k]))
                 decisions.append(decision)
                 if decision.valid:
                     self._valid, self._fields = True, decision.fields
@@ -210,10 +195,8 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
         self._hops += 1
         self._fresh += self.hop_samples
         missing_s = (self._slot.size - self._fresh) / SLOT_RATE_HZ
-        nothing = self._nothing
-        return _decision(
-            self.time_s, nothing.bits, nothing.levels, None, f"slot lacks {missing_s:.3f} s"
-        )
+        bits, levels = self._nothing
+        return Decision(self.time_s, bits, levels, False, None, f"slot lacks {missing_s:.3f} s")
 
     def _decimated(self, frames: RealArray) -> tuple[SingleArray, BoolArray]:
         """First filter over a batch of hops, and which hops are faulty and count as zeros.
@@ -227,7 +210,7 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
             fault = _input_faults(piece)
             if fault.any():
                 piece = np.where(fault[:, None], 0, piece)
-            parts.append(self._replay.fast.decimate(piece.astype(np.float32, copy=False)))
+            parts.append(self._fast_demodulator.decimate(piece.astype(np.float32, copy=False)))
             faulty.append(fault)
         return np.concatenate(parts), np.concatenate(faulty)
 
@@ -246,9 +229,7 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
         change = _rms(slots[1:, -self._short :] - parts[:-1] @ self._next_wave)
         limit = np.maximum(CHANGE_OVER_NOISE * residual[:-1], self._least_change_hz)
         goes_on = (bits[1:] == bits[:-1]).all(axis=1) & clear[1:] & ~(change > limit)
-        bits.setflags(write=False)
-        levels.setflags(write=False)
-        return _Steady(goes_on, bits[1:], levels[1:], parts[1:], residual[1:])
+        return _Steady(goes_on, read_only(bits)[1:], read_only(levels)[1:], parts[1:], residual[1:])
 
     def _continued_decisions(self, steady: _Steady, start: int, stop: int) -> list[Decision]:
         """Decisions from hop `start` to `stop`, in which the word in force goes on."""
@@ -261,36 +242,10 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
             parts[:tones] + 1j * parts[tones:], self._now, float(steady.residual_hz[stop - 1])
         )
         times = np.arange(first, self._hops + 1) * self.hop_samples / SLOT_RATE_HZ
-        fields = self._fields
-        return [
-            _decision(time_s, bits, levels, fields, "")
-            for time_s, bits, levels in zip(
-                times.tolist(), steady.bits[start:stop], steady.levels[start:stop], strict=True
-            )
-        ]
-
-
-def _decision(
-    time_s: float,
-    bits: BoolArray,
-    levels: FloatArray,
-    fields: Mapping[str, int] | None,
-    reason: str,
-) -> Decision:
-    """A decision, valid if there are fields, from arrays that are read-only already.
-
-    Making them so is all that the constructor would do, for half of the time of a hop.
-    """
-    decision = Decision.__new__(Decision)
-    decision.__dict__.update(
-        time_s=time_s,
-        bits=bits,
-        levels=levels,
-        valid=fields is not None,
-        fields=fields,
-        reason=reason,
-    )
-    return decision
+        bits, levels = steady.bits[start:stop], steady.levels[start:stop]
+        each = zip(times.tolist(), bits, levels, repeat(True), repeat(self._fields), repeat(""))
+        # As `Decision._make`, without a call of Python for each.
+        return list(map(tuple.__new__, repeat(Decision), each))
 
 
 def _real_rows(waves: ComplexArray) -> SingleArray:
@@ -308,9 +263,8 @@ def _input_faults(frames: RealArray) -> BoolArray:
     size = np.abs(frames)
     peak = size.max(axis=1)
     faulty = ~((peak > 0) & (peak <= LOUDEST))
-    at_peak = size == peak[:, None]
+    # Few as high as the lowest peak, and there are few at each peak: the count that is cheap.
     most = MOST_AT_PEAK * frames.shape[1]
-    # Few in all hops are few in each; as a rule there are, and this count is the cheap one.
-    if np.count_nonzero(at_peak) > most:
-        faulty |= np.count_nonzero(at_peak, axis=1) > most
+    if np.count_nonzero(size >= peak[~faulty].min(initial=np.inf)) > most:
+        faulty |= np.count_nonzero(size == peak[:, None], axis=1) > most
     return np.asarray(faulty, dtype=np.bool_)

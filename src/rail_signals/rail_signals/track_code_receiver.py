@@ -22,7 +22,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rail_signals.tone_levels import ToneEstimator, tone_columns, tone_estimator
-from rail_signals.track_code_decision import Confirmation, Decision, judge_levels, no_slot
+from rail_signals.track_code_decision import (
+    Confirmation,
+    Decision,
+    judge_levels,
+    no_slot,
+    read_only,
+)
 from rail_signals.track_code_demodulator import Demodulator, DemodulatorChain
 from rail_signals.track_code_profile import SLOT_RATE_HZ, TrackCodeProfile
 
@@ -115,7 +121,8 @@ class TrackCodeReceiver:
         self._frame = round(sample_rate_hz / SLOT_RATE_HZ) * self.hop_samples
         self._demodulator = Demodulator(self.chain)
         self._confirmation = Confirmation(confirmations)
-        self.reset()
+        # Not that of a subclass, which is not there yet.
+        TrackCodeReceiver.reset(self)
 
     def reset(self) -> None:
         """Forget everything received; the next sample is the first."""
@@ -162,9 +169,13 @@ class TrackCodeReceiver:
 
     def _hop(self, frame: FloatArray) -> Decision:
         """Take one hop of samples and decide."""
-        fault = _input_fault(frame)
+        fault = input_fault(frame)
         # Zeros keep what is not a number out of the filters, which would never forget it.
         demodulated, amplitude = self._demodulator.frame(np.zeros_like(frame) if fault else frame)
+        return self._take(fault, demodulated, amplitude)
+
+    def _take(self, fault: str, demodulated: FloatArray, amplitude: float) -> Decision:
+        """Take what a hop became, and what was wrong with its samples, and decide."""
         self._hops += 1
         kept = np.concatenate([self._slot, demodulated])
         self._slot = kept[kept.size - self._slot.size :]
@@ -202,8 +213,10 @@ class TrackCodeReceiver:
             present = np.where(bits, amplitudes, 0)
             left = self._slot - (self._model @ present).real
             self._word = Word(present, self._now, float(np.sqrt(np.mean(left * left))))
-        valid = not reason
-        return Decision(self.time_s, bits, levels, valid, fields if valid else None, reason)
+        message = None if reason else fields
+        return Decision(
+            self.time_s, read_only(bits), read_only(levels), not reason, message, reason
+        )
 
     def _change_noticed(self) -> bool:
         """Whether the short slot holds something else than the word in force goes on to be."""
@@ -235,7 +248,7 @@ def receiver_estimator(chain: DemodulatorChain) -> ToneEstimator:
     )
 
 
-def _input_fault(frame: FloatArray) -> str:
+def input_fault(frame: FloatArray) -> str:
     """What is wrong with samples as such; empty if nothing is."""
     size = np.abs(frame)
     peak = float(size.max())

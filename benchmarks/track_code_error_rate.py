@@ -8,8 +8,9 @@ Compared are, each with 95 % Clopper-Pearson intervals:
 bound       `track_code_bound`: tones of unknown phase, decided one by one, from amplitudes of
             the Cramér-Rao covariance.
 ML          `track_code_ml`: fit of the whole slot, searched for from scratch in every slot.
-ML, near    the same fit started at the truth: what remains when the search never fails, as
-            with a start from the slot before.
+ML, near    the same fit started at the truth: what remains when the search never fails.
+ML, tracked the same fit started from the slots before, eight of them a second, 8 s after the
+            word began; slots that count do not overlap.
 chain bits  the document's chain; a message is wrong if a level is on the wrong side of the
             middle between the windows.
 chain lost  the same with all its rules: windows, noise, CRC, two slots; lost is what is not
@@ -50,6 +51,7 @@ from rail_signals.track_code_decision import MOST_NOISE
 from rail_signals.track_code_demodulator import DemodulatorChain
 from rail_signals.track_code_filters import DEMODULATED_RATE_HZ, dc_rejecter, response
 from rail_signals.track_code_ml import MaximumLikelihoodTones
+from rail_signals.track_code_ml_tracker import TrackedTones
 from rail_signals.track_code_profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
 from rail_signals.track_code_receiver import TrackCodeReceiver, receiver_estimator
 from rail_signals.track_code_signal import FmTransmitter
@@ -63,6 +65,9 @@ PERIOD_S = 12.5
 
 BAND_TAPS = 128
 BATCH = 500
+STREAMS = 100
+SLOTS_PER_STREAM = 5
+SETTLED_S = 8.0
 TARGET = 1e-2
 DENSITIES_DB_HZ = (
     20.0,
@@ -82,6 +87,8 @@ DENSITIES_DB_HZ = (
     34.0,
 )
 MOST_ML_DB_HZ = 30.0
+LEAST_TRACKED_DB_HZ = 22.0
+"""Below, words are seldom found at all, and the search for them takes hours."""
 
 
 @dataclass(frozen=True)
@@ -155,16 +162,21 @@ class LowRateChain:
         turn = -2j * math.pi * np.outer((CARRIER_HZ + offset) / RATE_HZ, np.arange(taps.size))
         # Half, since the analytic filter doubles a real wave's positive frequencies.
         self._band = np.fft.ifft(band * (np.exp(turn) @ taps) / 2)[:BAND_TAPS]
-        t = np.arange(self.samples) / self.rate_hz
-        wave = 2 * math.pi * np.outer(self._tones, t)
-        self._waves = np.concatenate([np.cos(wave), -np.sin(wave)]).astype(np.float32)
+        self._waves = self._tone_waves(self.samples)
 
-    def waves(self, rng: np.random.Generator, bits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _tone_waves(self, samples: int) -> np.ndarray:
+        wave = 2 * math.pi * np.outer(self._tones, np.arange(samples) / self.rate_hz)
+        return np.concatenate([np.cos(wave), -np.sin(wave)]).astype(np.float32)
+
+    def waves(
+        self, rng: np.random.Generator, bits: np.ndarray, samples: int | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Complex baseband [n, samples] of words and the phases of their tones [n, tones]."""
+        waves = self._waves if samples is None else self._tone_waves(samples)
         start = 2 * math.pi * self._tones * rng.uniform(0, PERIOD_S, (len(bits), 1))
         index = bits * (self._deviations / self._tones)
         both = np.concatenate([index * np.cos(start), index * np.sin(start)], axis=1)
-        phase = -(both.astype(np.float32) @ self._waves)
+        phase = -(both.astype(np.float32) @ waves)
         phase += rng.uniform(0, 2 * math.pi, (len(bits), 1)).astype(np.float32)
         return np.cos(phase) + 1j * np.sin(phase), start
 
@@ -217,6 +229,7 @@ class Point:
     bound: float
     ml: Count | None
     near: Count | None
+    tracked: Count | None
     chain_bits: Count
     chain_lost: Count
     chain_wrong: Count
@@ -259,11 +272,10 @@ class Study:
 
     def point(self, density_db_hz: float, messages: int, ml_messages: int) -> Point:
         """Measure one point."""
+        followed = density_db_hz >= LEAST_TRACKED_DB_HZ
         rng = self.rng()
         snr = 10 ** (density_db_hz / 10) / self.low.rate_hz
-        sigma = tone_sigma_bound(self._tones, snr, self.low.slot, self.low.rate_hz)
-        ratio = self._deviations / sigma
-        threshold = sigma * [best_threshold(r) if r < 200 else r / 2 for r in ratio.tolist()]
+        threshold = self._thresholds_hz(snr)
         bits_wrong = lost = wrong = ml_wrong = near_wrong = 0
         for start in range(0, messages, BATCH):
             count = min(BATCH, messages - start)
@@ -287,10 +299,39 @@ class Study:
             self.bound(density_db_hz),
             Count(ml_wrong, ml_messages) if ml_messages else None,
             Count(near_wrong, ml_messages) if ml_messages else None,
+            self.tracked(density_db_hz, ml_messages) if ml_messages and followed else None,
             Count(bits_wrong, messages),
             Count(lost, messages),
             Count(wrong, messages),
         )
+
+    def _thresholds_hz(self, snr: float) -> np.ndarray:
+        """Levels that best tell a tone that is there from one that is not [tones, Hz]."""
+        sigma = tone_sigma_bound(self._tones, snr, self.low.slot, self.low.rate_hz)
+        ratio = (self._deviations / sigma).tolist()
+        return np.asarray(sigma * [best_threshold(r) if r < 200 else r / 2 for r in ratio])
+
+    def tracked(self, density_db_hz: float, messages: int) -> Count:
+        """Slots of streams that are followed, once they had time to be found."""
+        rng, low = self.rng(), self.low
+        snr = 10 ** (density_db_hz / 10) / low.rate_hz
+        threshold = self._thresholds_hz(snr)
+        hop = HOP * round(low.rate_hz / SLOT_RATE_HZ)
+        apart = math.ceil(low.slot / hop)
+        first = math.ceil(SETTLED_S * SLOT_RATE_HZ / HOP)
+        hops = first + (SLOTS_PER_STREAM - 1) * apart + 1
+        trials = wrong = 0
+        while trials < messages:
+            sent = low.words.draw(rng, STREAMS)
+            clean, _ = low.waves(rng, sent, low.slot + (hops - 1) * hop)
+            wave = clean + low.noise(rng, clean.shape, snr)
+            tracker = TrackedTones(self._ml, hop)
+            for k in range(hops):
+                levels = np.abs(tracker.next(wave[:, k * hop : k * hop + low.slot]).amplitudes_hz)
+                if k >= first and (k - first) % apart == 0:
+                    trials += STREAMS
+                    wrong += int(((levels > threshold) != sent).any(axis=1).sum())
+        return Count(wrong, trials)
 
     def _near(
         self, sent: np.ndarray, clean: np.ndarray, phase: np.ndarray, slots: np.ndarray
@@ -397,20 +438,18 @@ def measure(quick: bool = False) -> dict[str, object]:
     part = 20 if quick else 1
     bound_db = study.bound_density_db_hz()
     print(f"bound 1e-2 at {bound_db:.2f} dB Hz (27 tones, {study.low.profile.slot_s} s)")
-    head = (
-        f"{'C/N0':>5} {'bound':>8}  {'ML, near':27} {'ML':27} {'chain bits':27} {'chain lost':27}"
-    )
-    print(head)
+    names = ("ML, near", "ML, tracked", "ML", "chain bits", "chain lost")
+    print(f"{'C/N0':>5} {'bound':>8}  " + " ".join(f"{name:27}" for name in names))
     points = []
     for density in DENSITIES_DB_HZ:
         points.append(
-            study.point(density, 10_000 // part, 2000 // part if density <= MOST_ML_DB_HZ else 0)
+            study.point(density, 10_000 // part, 1000 // part if density <= MOST_ML_DB_HZ else 0)
         )
         p = points[-1]
-        cells = [p.near, p.ml, p.chain_bits, p.chain_lost]
+        cells = [p.near, p.tracked, p.ml, p.chain_bits, p.chain_lost]
         print(f"{density:5.1f} {p.bound:8.1e}  " + " ".join(f"{c or '-'!s:27}" for c in cells))
     losses: dict[str, float | None] = {}
-    for name in ("near", "ml", "chain_bits", "chain_lost"):
+    for name in ("near", "tracked", "ml", "chain_bits", "chain_lost"):
         curve = [(p.density_db_hz, c.rate) for p in points if (c := getattr(p, name)) is not None]
         at = density_at(curve, TARGET)
         losses[name] = None if at is None else at - bound_db

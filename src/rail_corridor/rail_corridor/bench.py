@@ -20,6 +20,7 @@ _FOLDER = Path(__file__).resolve().parents[3] / "benchmarks"
 MODULES = {
     "ranging_receive": "ranging",
     "track_code_decode": "track_code",
+    "cbtc_ber": "cbtc",
     "corridor_speed": "corridor",
 }
 

@@ -146,7 +146,7 @@ def test_a_train_understands_the_code_of_its_circuit(graph: Any) -> None:
 def test_supervision_brakes_without_a_code_and_releases_with_one(graph: Any) -> None:
     code = graph.sender(topics.CODE_RECEIVED, train="train_1")
     odometer = graph.sender(topics.ODOMETER, train="train_1")
-    box = graph.mailbox(topics.COMMAND, train="train_1")
+    box = graph.mailbox(topics.COMMAND, train="train_1", supervision="code_supervision")
     node = CodeSupervisionNode(namespace="/train_1", context=graph.context)
     node.switch_on()
     graph.add(node)

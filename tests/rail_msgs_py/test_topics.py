@@ -32,6 +32,8 @@ PARTS = {
     "circuit": ("tc1", "wrs1", "zone_controller"),
     "track": ("main", "markers", "path"),
     "channel": (1, 42),
+    "base": ("base1", "wrs1", "b"),
+    "supervision": ("atp", "code_supervision"),
     "node": ("/world/radio_medium", "/wayside/zone_controller"),
 }
 FIELDS = {name: value for name, value in vars(topics).items() if isinstance(value, Topic)}

@@ -19,7 +19,7 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
-from rail_msgs_py import topics
+from rail_msgs_py.topic import Topic
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Generous: it only makes a test fail that would otherwise hang.
@@ -156,7 +156,7 @@ class Listener:
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
 
-    def listen(self, topic: topics.Topic, **parts: object) -> list[Any]:
+    def listen(self, topic: Topic, **parts: object) -> list[Any]:
         """Subscribe; return the list that the messages are added to."""
         heard: list[Any] = []
         self.node.create_subscription(topic.type, topic.name(**parts), heard.append, topic.qos)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from .errors import InputError
-from .sections import DeadTransmitter, Sanding
+from .fault_sections import DeadTransmitter, Sanding
 
 if TYPE_CHECKING:
     from .scenario import Scenario

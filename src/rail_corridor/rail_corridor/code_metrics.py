@@ -9,20 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_msgs_py.topics import COMMAND_COLUMNS, RECEIVED_COLUMNS, SENT_COLUMNS, STATE_COLUMNS
+from rail_msgs_py.topics import RECEIVED_COLUMNS, SENT_COLUMNS, STATE_COLUMNS
 
 from .recording import FloatArray, Recording
 from .scenario import Scenario
+from .supervision_metrics import supervision_metrics, trains_ahead
 
 #: A valid message may be as old as the longest way through the receiver [s].
 OLDEST_S = 8.0
-#: Speed above the limit that counts as overspeed [m/s].
-OVERSPEED_MPS = 0.5
 
 _STATE = {name: index for index, name in enumerate(STATE_COLUMNS)}
 _SENT = {name: index for index, name in enumerate(SENT_COLUMNS)}
 _RECEIVED = {name: index for index, name in enumerate(RECEIVED_COLUMNS)}
-_COMMAND = {name: index for index, name in enumerate(COMMAND_COLUMNS)}
 
 
 def code_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
@@ -34,10 +32,10 @@ def code_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[s
     sent = recording.sent.upto(ticks)[:, :, _SENT["word"]]
     here = np.where(on_line, sent[np.arange(ticks), circuit], np.nan)
     received = recording.received.upto(ticks)[:, index]
-    command = recording.command.upto(ticks)[:, index]
     return {
         "track_code": _codes(scenario.tick_s, on_line, circuit, here, received),
-        "atp": _supervision(scenario, recording, index, on_line, circuit, command),
+        "atp": supervision_metrics(scenario, recording, index, on_line)
+        | {"entered_occupied": _entered_occupied(scenario, recording, index, on_line, circuit)},
     }
 
 
@@ -91,78 +89,21 @@ def _codes(
     }
 
 
-def _supervision(
+def _entered_occupied(
     scenario: Scenario,
     recording: Recording,
     index: int,
     on_line: NDArray[np.bool_],
     circuit: NDArray[np.intp],
-    command: FloatArray,
-) -> dict[str, Any]:
-    """What supervision did, and whether the train was safe.
-
-    ``entered_occupied`` counts circuits that its front entered while another train was in them,
-    ``margin_min_m`` is the least distance to the rear of a train ahead on the same track.
-    """
-    state = recording.state.upto(recording.ticks)
-    mine = state[:, index]
-    speed_mps = np.abs(mine[:, _STATE["speed_mps"]])
-    limit_mps = _limits(scenario, recording, mine)
-    brakes = (command[:, _COMMAND["service_brake"]] > 0.0) & on_line
-    emergency = (command[:, _COMMAND["emergency_brake"]] > 0.0) & on_line
-    moving = speed_mps > 0.0
-    margin_m, entered = _clearance(scenario, recording, index, on_line, circuit)
-    over = on_line & (speed_mps > limit_mps + OVERSPEED_MPS)
-    beyond = on_line & (speed_mps > command[:, _COMMAND["permitted_mps"]] + OVERSPEED_MPS)
-    return {
-        "interventions": _rises((brakes | emergency) & moving),
-        "emergency_brakes": _rises(emergency & moving),
-        "overspeed_s": float(np.count_nonzero(over) * scenario.tick_s),
-        "above_permitted_s": float(np.count_nonzero(beyond) * scenario.tick_s),
-        "entered_occupied": entered,
-        "margin_min_m": margin_m,
-    }
-
-
-def _limits(scenario: Scenario, recording: Recording, mine: FloatArray) -> FloatArray:
-    limits = np.full(len(mine), np.inf)
-    for track, name in enumerate(recording.tracks):
-        there = mine[:, _STATE["track_index"]] == track
-        chainage_m = mine[there, _STATE["chainage_m"]]
-        limits[there] = scenario.network.tracks[name].limit_mps(chainage_m)
-    return limits
-
-
-def _clearance(
-    scenario: Scenario,
-    recording: Recording,
-    index: int,
-    on_line: NDArray[np.bool_],
-    circuit: NDArray[np.intp],
-) -> tuple[float | None, int]:
-    state = recording.state.upto(recording.ticks)
-    mine = state[:, index]
+) -> int:
+    """Circuits that the front of a train entered while another train was in them."""
     starts_m = np.array([c.start_m for c in scenario.circuits])
     ends_m = np.array([c.end_m for c in scenario.circuits])
     enters = on_line.copy()
     enters[1:] &= (circuit[1:] != circuit[:-1]) & on_line[:-1]
     enters[:1] = False
-    least_m, entered = math.inf, 0
-    for other, train in enumerate(scenario.trains):
-        if other == index:
-            continue
-        theirs = state[:, other]
-        together = on_line & (theirs[:, _STATE["on_line"]] > 0.0)
-        together &= theirs[:, _STATE["track_index"]] == mine[:, _STATE["track_index"]]
-        front_m = theirs[:, _STATE["chainage_m"]]
-        rear_m = front_m - train.vehicle.length_m
-        ahead = together & (front_m > mine[:, _STATE["chainage_m"]])
-        gap_m = rear_m[ahead] - mine[ahead, _STATE["chainage_m"]]
-        least_m = min(least_m, float(gap_m.min(initial=math.inf)))
+    entered = 0
+    for ahead, front_m, rear_m in trains_ahead(scenario, recording, index, on_line):
         inside = ahead & (rear_m < ends_m[circuit]) & (front_m > starts_m[circuit])
         entered += int(np.count_nonzero(enters & inside))
-    return (least_m if math.isfinite(least_m) else None), entered
-
-
-def _rises(flags: NDArray[np.bool_]) -> int:
-    return int(np.count_nonzero(flags[1:] & ~flags[:-1]) + (flags.size > 0 and flags[0]))
+    return entered

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from rail_world.errors import WorldDataError, shorten
 
-_LONGEST_PART: Final = 200
+_LONGEST_PART: Final = 300
 _FIELD_IN_REASON: Final = re.compile(r"([a-z_]+(?:\.\w+)*): (.*)", re.DOTALL)
 
 

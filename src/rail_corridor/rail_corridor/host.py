@@ -26,9 +26,16 @@ NODE_CLASSES = {
     ),
     "track_code_receiver": ("rail_onboard.track_code_receiver_node", "TrackCodeReceiverNode"),
     "code_supervision": ("rail_onboard.code_supervision_node", "CodeSupervisionNode"),
+    "cbtc_medium": ("rail_world.cbtc_medium_node", "CbtcMediumNode"),
+    "cbtc_base_station": ("rail_wayside.cbtc_base_station_node", "CbtcBaseStationNode"),
+    "cbtc_radio": ("rail_onboard.cbtc_radio_node", "CbtcRadioNode"),
+    "atp": ("rail_onboard.atp_node", "AtpNode"),
 }
 #: Kinds whose name is a parameter of the scenario rather than of the class.
-_NAMED = {"wrs", "vrs", "track_code_transmitter", "track_code_receiver", "code_supervision"}
+_NAMED = {
+    *("wrs", "vrs", "track_code_transmitter", "track_code_receiver", "code_supervision"),
+    *("cbtc_base_station", "cbtc_radio", "atp"),
+}
 #: With more nodes than this in a process the parameter services are left out.
 MOST_NODES_WITH_SERVICES = 12
 

@@ -27,7 +27,8 @@ from .placing import (
     place_by_hand,
     tracks_in_order,
 )
-from .sections import ChannelPair, ChannelPlan, StationPlan
+from .section_fields import ChannelPair
+from .sections import ChannelPlan, StationPlan
 
 Vector = tuple[float, float, float]
 

@@ -17,6 +17,7 @@ from rail_msgs_py.position import figures_from_cdr as position_from_cdr
 from rail_msgs_py.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.stamps import to_ns
 from rail_msgs_py.table import figures_from_cdr
+from rail_msgs_py.topic import Topic
 
 from .plan import Plan
 from .recording import Record, Recording
@@ -61,7 +62,8 @@ class Observer(CorridorNode):
         channels = len({antenna.downlink_channel for antenna in radio.stations})
         rails = plan.world.rails
         circuits = () if rails is None else tuple(circuit.name for circuit in rails.circuits)
-        self.recording = Recording(radio.trains, tracks, channels, circuits)
+        cbtc = plan.world.cbtc is not None
+        self.recording = Recording(radio.trains, tracks, channels, circuits, cbtc=cbtc)
         self._width = 2 + channels
         self.failures: list[dict[str, Any]] = []
         self.events: list[dict[str, Any]] = []
@@ -84,6 +86,7 @@ class Observer(CorridorNode):
                     topics.VRS_CHANNEL, lambda raw, i=index: self._on_channel(i, raw), train=train
                 )
             self._listen_to_codes()
+            self._listen_to_authorities()
         self.every(0.1, on_progress)
         self.announce_when_connected()
 
@@ -116,9 +119,30 @@ class Observer(CorridorNode):
             self._record(recording.sent, topics.CODE_SENT, index, circuit=circuit)
         for index, train in enumerate(recording.trains if recording.circuits else ()):
             self._record(recording.received, topics.CODE_RECEIVED, index, train=train)
-            self._record(recording.command, topics.COMMAND, index, train=train)
+            self._record_command(index, train, "code_supervision")
 
-    def _record(self, record: Record, topic: topics.Topic, row: int, **parts: object) -> None:
+    def _listen_to_authorities(self) -> None:
+        recording = self.recording
+        if not recording.cbtc:
+            return
+        for index, train in enumerate(recording.trains):
+            self._record(recording.radio, topics.RADIO_LINK, index, train=train)
+            self._record(recording.atp, topics.ATP_STATE, index, train=train)
+            self._record(recording.authority, topics.AUTHORITY, index, train=train)
+            self._record_command(index, train, "atp")
+
+        def put(raw: bytes) -> None:
+            links = recording.cbtc_links
+            stamp_ns, figures = figures_from_cdr(raw, len(recording.trains), links.columns)
+            links.put(stamp_ns // self._tick_ns, slice(None), figures)
+
+        self.stream_in(topics.CBTC_LINKS, put)
+
+    def _record_command(self, index: int, train: str, supervision: str) -> None:
+        command = self.recording.command
+        self._record(command, topics.COMMAND, index, train=train, supervision=supervision)
+
+    def _record(self, record: Record, topic: Topic, row: int, **parts: object) -> None:
         """Record the one row of each table on a topic."""
 
         def put(raw: bytes) -> None:

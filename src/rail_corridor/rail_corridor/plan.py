@@ -15,6 +15,7 @@ from rail_world.radio import THERMAL_NOISE_DBM_PER_HZ
 from rail_world.world_file import WorldFile
 
 from .calibration import Transponder, calibrate
+from .cbtc_plan import cbtc_nodes, controller_parameters
 from .code_plan import code_nodes
 from .errors import InputError
 from .layout import Layout
@@ -127,10 +128,14 @@ def make_plan(
         "world",
         {"world_file": str(world_path), "timeout_s": 2 * timeout_s / 5},
     )
-    codes = code_nodes(scenario, str(world_path), timeout_s)
-    others = [medium, controller, *equipment, *codes]
-    sinks = [MEDIUM, CONTROLLER, *(spec.name for spec in codes if spec.kind == "rail_medium")]
-    clocked = {"wrs", "track_code_transmitter"}
+    more = [
+        *code_nodes(scenario, str(world_path), timeout_s),
+        *cbtc_nodes(scenario, str(world_path), timeout_s),
+    ]
+    others = [medium, controller, *equipment, *more]
+    sinks = [MEDIUM, CONTROLLER, *(spec.name for spec in more if spec.side == "world")]
+    clocked = {"wrs", "track_code_transmitter", "cbtc_base_station", "cbtc_radio"}
+    supervision = scenario.supervision
     parameters = {
         "world_file": str(world_path),
         "ticks": scenario.ticks,
@@ -141,7 +146,8 @@ def make_plan(
             {CONTROLLER, *(spec.name for spec in others if spec.kind in clocked)} - {*external}
         ),
         "supervised": tuple(scenario.supervised),
-        "cab_signals": scenario.track_circuits is None or scenario.track_circuits.cab_signals,
+        "supervision": supervision.node if supervision else "",
+        "cab_signals": supervision is None or supervision.cab_signals,
         "observed": observed,
         "end_when_arrived": scenario.end_when_arrived,
         "timeout_s": timeout_s,
@@ -227,4 +233,5 @@ def _controller(scenario: Scenario, layout: Layout, timeout_s: float) -> dict[st
         "trains": tuple(train.name for train in trains),
         "entry_zones": tuple(entry),
         "timeout_s": timeout_s,
+        **controller_parameters(scenario),
     }

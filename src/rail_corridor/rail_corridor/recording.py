@@ -47,6 +47,8 @@ class Recording:
         Number of downlink channels.
     circuits : tuple of str
         Names of the track circuits, in the order of the scenario; with any, trains obey codes.
+    cbtc : bool
+        Whether trains obey authorities received by radio.
     """
 
     def __init__(
@@ -55,10 +57,16 @@ class Recording:
         tracks: tuple[str, ...],
         channels: int,
         circuits: tuple[str, ...] = (),
+        *,
+        cbtc: bool = False,
     ) -> None:
         from rail_msgs_py.topics import (
+            ATP_COLUMNS,
+            AUTHORITY_COLUMNS,
+            CBTC_LINK_COLUMNS,
             COMMAND_COLUMNS,
             LINK_COLUMNS,
+            RADIO_COLUMNS,
             RECEIVED_COLUMNS,
             SENT_COLUMNS,
             STATE_COLUMNS,
@@ -70,6 +78,11 @@ class Recording:
         self.sent = Record(len(circuits), len(SENT_COLUMNS))
         self.received = Record(len(trains), len(RECEIVED_COLUMNS))
         self.command = Record(len(trains), len(COMMAND_COLUMNS))
+        self.cbtc = cbtc
+        self.atp = Record(len(trains), len(ATP_COLUMNS))
+        self.authority = Record(len(trains), len(AUTHORITY_COLUMNS))
+        self.radio = Record(len(trains), len(RADIO_COLUMNS))
+        self.cbtc_links = Record(len(trains), len(CBTC_LINK_COLUMNS))
         self.state = Record(len(trains), len(STATE_COLUMNS))
         self.links = Record(len(trains), len(LINK_COLUMNS))
         self.channel = Record(len(trains), 2 + channels)
@@ -84,6 +97,8 @@ class Recording:
     def estimates(self) -> tuple[Record, ...]:
         """What the equipment on the trains and for them has made out."""
         ranging = (self.position, self.channel)
+        if self.cbtc:
+            return (*ranging, self.radio, self.atp, self.authority, self.command)
         return (*ranging, self.received, self.command) if self.circuits else ranging
 
     @property

@@ -10,6 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from .cbtc_metrics import cbtc_metrics
 from .code_metrics import code_metrics
 from .metrics import train_metrics
 from .observer import Observer
@@ -40,6 +41,8 @@ def make_report(
         section["phase_ranging"]["calibration_residual_m"] = unit.residual_m
         if recording.circuits:
             section |= code_metrics(scenario, recording, index)
+        if recording.cbtc:
+            section |= cbtc_metrics(scenario, recording, index)
         trains[name] = section
     return {
         "scenario": plan.scenario,
@@ -84,6 +87,7 @@ def print_report(report: dict[str, Any], console: Console) -> None:
         )
     console.print(table)
     _print_codes(report["trains"], console)
+    _print_authorities(report["trains"], console)
     factor = report["real_time_factor"]
     speed = f"{factor:.1f} times real time, " if factor else ""
     console.print(
@@ -135,6 +139,32 @@ def _print_codes(trains: dict[str, Any], console: Console) -> None:
             str(atp["interventions"]),
             f"{atp['overspeed_s']:.1f}",
             str(atp["entered_occupied"]),
+            "-" if margin_m is None else f"{margin_m:.0f}",
+        )
+    console.print(table)
+
+
+def _print_authorities(trains: dict[str, Any], console: Console) -> None:
+    """Show what the train radio brought, and what supervision did."""
+    obeying = {name: train for name, train in trains.items() if "cbtc" in train}
+    if not obeying:
+        return
+    title = "movement authorities by radio, and supervision"
+    table = Table(title=title, title_justify="left", title_style="bold")
+    headings = ("train", "frames", "lost", "age 95 % s", "braked", "emerg.", "passed", "gap m")
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "train" else "right", no_wrap=True)
+    for name, train in obeying.items():
+        link, atp = train["cbtc"], train["atp"]
+        margin_m, age_s = atp["margin_min_m"], link["age_p95_s"]
+        table.add_row(
+            name,
+            str(link["frames"]),
+            f"{100.0 * link['lost'] / link['frames']:.1f} %" if link["frames"] else "-",
+            "-" if age_s is None else f"{age_s:.2f}",
+            str(atp["interventions"]),
+            str(atp["emergency_brakes"]),
+            str(atp["passed_authority"]),
             "-" if margin_m is None else f"{margin_m:.0f}",
         )
     console.print(table)

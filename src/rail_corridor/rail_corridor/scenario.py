@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any, Final, get_args
+from typing import Any, Final, NamedTuple, get_args
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
@@ -21,23 +21,34 @@ from rail_world.description import (
 )
 from rail_world.network import Network, build_network
 
+from .base_stations import Base, place_bases
+from .cbtc_section import CbtcPlan
 from .circuits import Circuit, place_circuits
 from .errors import InputError, from_validation
+from .fault_sections import Fault
 from .layout import Layout, place_stations
 from .overrides import Overrides, apply_overrides, blame_override
 from .scenario_checks import check_scenario
+from .section_fields import Whole
 from .sections import (
     ChannelPlan,
-    Fault,
     RadioPlan,
     RangingPlan,
     StationPlan,
     TrackCircuitPlan,
     TransponderPlan,
-    Whole,
 )
 from .timetable import Timetable
 from .yaml_file import load_yaml
+
+
+class Supervision(NamedTuple):
+    """Supervision on board: node, whether drivers see what it permits, error of the wheels."""
+
+    node: str
+    cab_signals: bool
+    odometer_error: float
+
 
 _SCENARIOS: Final = Path(str(resources.files(__package__))) / "scenarios"
 _MOST_TICKS: Final = 10_000_000
@@ -65,6 +76,9 @@ class Scenario(Description):
     transponder: TransponderPlan = Field(default=TransponderPlan(), description="on board")
     track_circuits: TrackCircuitPlan | None = Field(
         default=None, description="codes in the rails, which trains obey; null = none"
+    )
+    cbtc: CbtcPlan | None = Field(
+        default=None, description="train control by radio, which trains obey; null = none"
     )
     trains: tuple[TrainDescription, ...] = Field(
         default=(), max_length=100, description="trains one by one"
@@ -111,10 +125,25 @@ class Scenario(Description):
         longest_m = max((train.vehicle.length_m for train in self.trains), default=0.0)
         return place_circuits(self.network, plan, longest_m)
 
+    @cached_property
+    def bases(self) -> tuple[Base, ...]:
+        """Base stations of the train radio in the order of the tracks; none without a plan."""
+        return () if self.cbtc is None else place_bases(self.network, self.cbtc)
+
+    @property
+    def supervision(self) -> Supervision | None:
+        """What trains obey, None if they run by themselves."""
+        if self.cbtc is not None:
+            return Supervision("atp", self.cbtc.cab_signals, self.cbtc.odometer_error)
+        circuits = self.track_circuits
+        if circuits is not None:
+            return Supervision("code_supervision", circuits.cab_signals, circuits.odometer_error)
+        return None
+
     @property
     def supervised(self) -> tuple[str, ...]:
-        """Trains that obey the codes in the rails."""
-        return () if self.track_circuits is None else tuple(train.name for train in self.trains)
+        """Trains that obey what they receive."""
+        return () if self.supervision is None else tuple(train.name for train in self.trains)
 
     def to_json(self) -> str:
         """Return the scenario as JSON, for another process or a recording."""

@@ -11,10 +11,12 @@ from rail_world.description import TrainDescription
 from rail_world.errors import WorldDataError
 from rail_world.motion import TrainMotion
 
+from .cbtc_checks import check_cbtc
 from .code_checks import check_codes
 from .errors import InputError, from_world
+from .fault_sections import DeadStation, Jam
 from .layout import Layout
-from .sections import LONGEST_ZONE_M, DeadStation, Jam, StationPlan
+from .sections import LONGEST_ZONE_M, StationPlan
 from .timetable import CLEARING_TIME_S
 
 if TYPE_CHECKING:
@@ -63,6 +65,7 @@ def check_scenario(scenario: Scenario, train_fields: Sequence[str]) -> None:
     _check_first_zones(scenario, layout, train_fields)
     _check_faults(scenario, layout)
     check_codes(scenario, train_fields)
+    check_cbtc(scenario, train_fields)
 
 
 def _check_zone_lengths(scenario: Scenario, layout: Layout) -> None:

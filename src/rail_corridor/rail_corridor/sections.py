@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Annotated, Final, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.ranging_signal import RangingSignal
@@ -21,25 +21,12 @@ from rail_world.description import (
     Number,
 )
 
+from .section_fields import ChannelPair, Frequency, Gain, Power, Whole
+
 LONGEST_ZONE_M: Final = 2000.0
 SHORTEST_ZONE_M: Final = 20.0
 #: Profile whose fields the supervision of trains understands.
 TRACK_CODE: Final = "tones27"
-
-
-def _not_a_bool(value: object) -> object:
-    if isinstance(value, bool):
-        raise ValueError("a whole number is wanted, not a truth value")
-    return value
-
-
-Whole = Annotated[int, BeforeValidator(_not_a_bool)]
-ChannelNumber = Annotated[Whole, Field(ge=1, le=99)]
-ChannelPair = tuple[ChannelNumber, ChannelNumber]
-Time = Annotated[Number, Field(ge=0.0, le=1e6)]
-Frequency = Annotated[Number, Field(ge=1.0, le=1e9)]
-Power = Annotated[Number, Field(ge=-150.0, le=60.0)]
-Gain = Annotated[Number, Field(ge=-20.0, le=40.0)]
 
 
 class StationPosition(Description):
@@ -312,49 +299,3 @@ class TransponderPlan(Description):
     bench_bursts: Whole = Field(
         default=400, ge=1, le=100_000, description="bursts of the calibration on the bench"
     )
-
-
-class _Fault(Description):
-    from_s: Time = Field(default=0.0, description="begin [s]")
-    to_s: Time = Field(default=1e6, description="end [s]")
-
-    @model_validator(mode="after")
-    def _has_a_duration(self) -> _Fault:
-        if self.to_s <= self.from_s:
-            raise ValueError(f"to_s: must be after from_s, {self.from_s:g} s")
-        return self
-
-
-class DeadStation(_Fault):
-    """A station that neither sends nor receives."""
-
-    kind: Literal["dead_station"]
-    station: Name = Field(description="its name")
-
-
-class Jam(_Fault):
-    """A jammer: band-limited noise on one channel, from a place at the track."""
-
-    kind: Literal["jam"]
-    channel: ChannelNumber = Field(description="channel it jams")
-    power_dbm: Power = Field(default=0.0, description="its power [dBm]")
-    track: Name = Field(description="track it stands at")
-    at_m: Chainage = Field(description="chainage it stands at [m]")
-
-
-class Sanding(_Fault):
-    """Sand on the rails: a train picks up less."""
-
-    kind: Literal["sanding"]
-    train: Name = Field(description="the train that sands")
-    loss_db: Number = Field(default=60.0, ge=0.0, le=200.0, description="pick-up lost [dB]")
-
-
-class DeadTransmitter(_Fault):
-    """A track circuit that sends nothing."""
-
-    kind: Literal["dead_transmitter"]
-    circuit: Name = Field(description="its name: tc1, tc2, ... in the order of the tracks")
-
-
-Fault = Annotated[DeadStation | Jam | Sanding | DeadTransmitter, Field(discriminator="kind")]

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from rail_world.description import Description, Name, Number, TrainDescription
 
-from .sections import Whole
+from .section_fields import Whole
 
 CLEARING_TIME_S: Final = 30.0
 """Time after which a departed train has left the place it departed from [s]."""

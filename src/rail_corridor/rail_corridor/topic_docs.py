@@ -13,12 +13,16 @@ from typing import Any, get_type_hints
 
 from rail_msgs_py import topics
 from rail_msgs_py.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
+from rail_onboard.atp_node import AtpParameters
+from rail_onboard.cbtc_radio_node import CbtcRadioParameters
 from rail_onboard.code_supervision_node import CodeSupervisionParameters
 from rail_onboard.track_code_receiver_node import TrackCodeReceiverParameters
 from rail_onboard.vrs_node import VrsParameters
+from rail_wayside.cbtc_base_station_node import CbtcBaseStationParameters
 from rail_wayside.track_code_transmitter_node import TrackCodeTransmitterParameters
 from rail_wayside.wrs_node import WrsParameters
 from rail_wayside.zone_controller_node import ZoneControllerParameters
+from rail_world.cbtc_medium_node import CbtcMediumParameters
 from rail_world.radio_medium_node import RadioMediumParameters
 from rail_world.rail_medium_node import RailMediumParameters
 from rail_world.world_node import WorldParameters
@@ -34,6 +38,10 @@ PARAMETERS: dict[str, Any] = {
     "track_code_transmitter": TrackCodeTransmitterParameters,
     "track_code_receiver": TrackCodeReceiverParameters,
     "code_supervision": CodeSupervisionParameters,
+    "cbtc_medium": CbtcMediumParameters,
+    "cbtc_base_station": CbtcBaseStationParameters,
+    "cbtc_radio": CbtcRadioParameters,
+    "atp": AtpParameters,
 }
 
 _INTRODUCTION = """\

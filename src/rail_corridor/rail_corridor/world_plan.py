@@ -15,11 +15,13 @@ from rail_world.radio_description import (
     StationAntenna,
 )
 from rail_world.rail_description import Harmonic, RailDescription, RailFault, TrackCircuit
-from rail_world.world_file import WorldFile
+from rail_world.world_file import TrainStop, WorldFile
 
+from .cbtc_plan import cbtc_description
+from .fault_sections import DeadStation, DeadTransmitter, Jam, Sanding
+from .fault_sections import TrainStop as TrainStopFault
 from .layout import Layout, Zone
 from .scenario import Scenario
-from .sections import DeadStation, DeadTransmitter, Jam, Sanding
 
 #: Antennas of a branching station look this far outward, so that their levels part at once.
 SQUINT_RAD = math.radians(25.0)
@@ -94,7 +96,7 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
             if isinstance(fault, DeadStation | Jam)
         ),
     )
-    codes = scenario.track_circuits
+    supervision = scenario.supervision
     return WorldFile(
         seed=scenario.seed,
         tick_s=scenario.tick_s,
@@ -103,7 +105,13 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
         trains=scenario.trains,
         radio=radio,
         rails=rails_of(scenario),
-        odometer_error=0.0 if codes is None else codes.odometer_error,
+        cbtc=cbtc_description(scenario),
+        stops=tuple(
+            TrainStop(train=fault.train, from_s=fault.from_s, to_s=fault.to_s)
+            for fault in scenario.faults
+            if isinstance(fault, TrainStopFault)
+        ),
+        odometer_error=0.0 if supervision is None else supervision.odometer_error,
     )
 
 

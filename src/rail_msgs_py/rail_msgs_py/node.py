@@ -17,6 +17,7 @@ from std_msgs.msg import String
 from rail_msgs_py import topics
 from rail_msgs_py.parameters import overrides
 from rail_msgs_py.stamps import to_time
+from rail_msgs_py.topic import Topic
 
 READY_POLL_S = 0.05
 
@@ -54,11 +55,11 @@ class CorridorMixin:
         self._ready_publisher: Any = None
         self._ready_timer: Any = None
 
-    def publisher(self: Any, topic: topics.Topic, **parts: object) -> Any:
+    def publisher(self: Any, topic: Topic, **parts: object) -> Any:
         """Publisher of a topic of the table."""
         return self.create_publisher(topic.type, topic.name(**parts), topic.qos)
 
-    def stream_out(self: Any, topic: topics.Topic, **parts: object) -> Callable[[bytes], None]:
+    def stream_out(self: Any, topic: Topic, **parts: object) -> Callable[[bytes], None]:
         """Function that publishes serialised messages to a reader that the tick waits for."""
         publisher = self.publisher(topic, **parts)
         self._connections.append(lambda: publisher.get_subscription_count() > 0)
@@ -67,7 +68,7 @@ class CorridorMixin:
         return publish
 
     def stream_in(
-        self: Any, topic: topics.Topic, callback: Callable[[bytes], None], **parts: object
+        self: Any, topic: Topic, callback: Callable[[bytes], None], **parts: object
     ) -> None:
         """Subscribe to serialised messages of a topic of the table."""
         name = topic.name(**parts)
@@ -75,7 +76,7 @@ class CorridorMixin:
         self._connections.append(lambda: self.count_publishers(name) > 0)
 
     def listen(
-        self: Any, topic: topics.Topic, callback: Callable[[Any], None], **parts: object
+        self: Any, topic: Topic, callback: Callable[[Any], None], **parts: object
     ) -> None:
         """Subscribe to messages of a topic that nothing waits for."""
         self._subscribe(topic.type, topic.name(**parts), callback, topic.qos, raw=False)

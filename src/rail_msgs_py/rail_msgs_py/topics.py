@@ -6,70 +6,35 @@ compares it with a running graph.
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry, Path
-from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Range
 from std_msgs.msg import Float64MultiArray, Header, String
 from visualization_msgs.msg import MarkerArray
 
+from rail_msgs_py.cbtc_topics import (
+    ATP_STATE,
+    AUTHORITY,
+    CBTC_BASE_RX,
+    CBTC_BASE_TX,
+    CBTC_LINKS,
+    CBTC_TRAIN_RX,
+    CBTC_TRAIN_TX,
+    DOWN_TELEGRAMS,
+    RADIO_LINK,
+    RADIO_TELEGRAMS,
+    TRAIN_TELEGRAMS,
+    UP_TELEGRAMS,
+)
 from rail_msgs_py.position import Position
 from rail_msgs_py.qos import ESTIMATE, LATCHED, STREAM
 from rail_msgs_py.range_reading import RangeReading
 from rail_msgs_py.table import Table
+from rail_msgs_py.topic import Topic
 from rail_msgs_py.waveform import Waveform
-
-
-@dataclass(frozen=True)
-class Topic:
-    """One kind of topic.
-
-    Parameters
-    ----------
-    pattern : str
-        Absolute name with ``{placeholders}`` in names of their own level.
-    type : message class
-    qos : QoSProfile
-    view : class with ``from_msg``, or None
-        How ``rail echo`` decodes it.
-    sender, readers, text : str
-        For the documentation.
-    """
-
-    pattern: str
-    type: Any
-    qos: QoSProfile
-    view: Any
-    sender: str
-    readers: str
-    text: str
-
-    def name(self, **parts: object) -> str:
-        """Absolute name with the placeholders filled in.
-
-        >>> RANGE.name(site="wrs1", zone="zone1")
-        '/wayside/wrs1/zone1/range'
-        """
-        return self.pattern.format(**parts)
-
-    def owner(self, **parts: object) -> str:
-        """Full name of the node that sends it, where the topic is named below its node.
-
-        >>> OCCUPANCY.owner(circuit="tc1")
-        '/wayside/tc1/track_code'
-        """
-        return self.name(**parts).rpartition("/")[0]
-
-    def matches(self, name: str) -> bool:
-        """Whether ``name`` is of this kind."""
-        expression = re.sub(r"\\\{\w+\\\}", r"[^/]+", re.escape(self.pattern))
-        return re.fullmatch(expression, name) is not None
-
 
 CLOCK: Final = Topic(
     "/clock",
@@ -77,7 +42,7 @@ CLOCK: Final = Topic(
     STREAM,
     None,
     "world",
-    "wrs, zone_controller, track_code_transmitter",
+    "wrs, zone_controller, track_code_transmitter, cbtc_base_station, cbtc_radio",
     "Start of a tick.",
 )
 STATE: Final = Topic(
@@ -86,7 +51,7 @@ STATE: Final = Topic(
     ESTIMATE,
     Table,
     "world",
-    "radio_medium, rail_medium, the report",
+    "radio_medium, rail_medium, cbtc_medium, the report",
     "The truth of the tick, one row per train: where its antenna is, how it moves. "
     "Equipment does not read it.",
 )
@@ -141,7 +106,7 @@ DONE: Final = Topic(
     Header,
     STREAM,
     None,
-    "radio_medium, rail_medium, zone_controller",
+    "radio_medium, rail_medium, cbtc_medium, zone_controller",
     "world",
     "The node has finished the tick of this stamp.",
 )
@@ -169,9 +134,10 @@ FAILED: Final = Topic(
     LATCHED,
     None,
     "every node that waits for others, the report for the launcher: world, radio_medium, "
-    "rail_medium, zone_controller, track_code_transmitter, code_supervision",
-    "world, radio_medium, rail_medium, zone_controller, track_code_transmitter, "
-    "code_supervision, the report",
+    "rail_medium, cbtc_medium, zone_controller, track_code_transmitter, cbtc_base_station, "
+    "code_supervision, cbtc_radio, atp",
+    "world, radio_medium, rail_medium, cbtc_medium, zone_controller, track_code_transmitter, "
+    "cbtc_base_station, code_supervision, cbtc_radio, atp, the report",
     "A node that is not waited for any longer, and why.",
 )
 DIAGNOSTICS: Final = Topic(
@@ -235,7 +201,7 @@ VRS_CHANNEL: Final = Topic(
     Table,
     "vrs",
     "people, the report",
-    "Channel pair in force after the tick, and the level on each downlink channel.",
+    "Channel in force after the tick, and the level on each downlink channel.",
 )
 POSITION: Final = Topic(
     "/wayside/zone_controller/{train}/position",
@@ -307,15 +273,15 @@ ODOMETER: Final = Topic(
     STREAM,
     Table,
     "world",
-    "code_supervision",
+    "code_supervision, atp",
     "What the wheels of a train count: distance and speed, with the error of their diameter.",
 )
 COMMAND: Final = Topic(
-    "/{train}/code_supervision/command",
+    "/{train}/{supervision}/command",
     Float64MultiArray,
     ESTIMATE,
     Table,
-    "code_supervision",
+    "code_supervision or atp",
     "world, people, the report",
     "What supervision on board permits and demands; it moves the train in the next tick.",
 )
@@ -324,6 +290,8 @@ ALL: Final[tuple[Topic, ...]] = (
     *(CLOCK, STATE, TRUTH, LINKS, FINISHED, CORRIDOR_PATH, CORRIDOR_MARKERS, DONE, OBSERVED),
     *(READY, FAILED, DIAGNOSTICS, WRS_TX, WRS_RX, RANGE, VRS_RX, VRS_TX, VRS_CHANNEL, POSITION),
     *(CIRCUIT_TX, CIRCUIT_RX, OCCUPANCY, CODE_SENT, CODE_RX, CODE_RECEIVED, ODOMETER, COMMAND),
+    *(CBTC_BASE_TX, CBTC_BASE_RX, CBTC_TRAIN_TX, CBTC_TRAIN_RX, DOWN_TELEGRAMS, UP_TELEGRAMS),
+    *(TRAIN_TELEGRAMS, RADIO_TELEGRAMS, RADIO_LINK, CBTC_LINKS, ATP_STATE, AUTHORITY),
 )
 
 STATE_COLUMNS: Final = (
@@ -338,6 +306,16 @@ RECEIVED_COLUMNS: Final = (
     "level_db",
 )
 ODOMETER_COLUMNS: Final = ("distance_m", "speed_mps")
+RADIO_COLUMNS: Final = ("channel", "beacon_snr", "bursts")
+CBTC_LINK_COLUMNS: Final = ("base_index", "snr_down", "snr_up")
+ATP_COLUMNS: Final = (
+    *("front_m", "uncertainty_m", "end_of_authority_m", "authority_age_s"),
+    *("accepted", "lost", "rejected"),
+)
+AUTHORITY_COLUMNS: Final = (
+    *("end_of_authority_m", "limit_mps", "worst_rear_m", "report_age_s"),
+    *("accepted", "lost", "rejected"),
+)
 COMMAND_COLUMNS: Final = ("permitted_mps", "warning", "service_brake", "emergency_brake")
 
 

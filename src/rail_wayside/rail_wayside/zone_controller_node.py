@@ -1,12 +1,15 @@
 """Zone controller: turns the ranges of all stations into positions of all trains.
 
-Topics in: ``/clock``, every ``range``. Topics out: ``~/<train>/position``, ``~/done``.
+With base stations it also gives movement authorities, from reports and ranges (`AuthorityDesk`).
+
+Topics in: ``/clock``, every ``range``, every base station's ``telegrams``. Topics out:
+``~/<train>/position``, ``~/<train>/authority``, ``~/<base>/telegrams``, ``~/done``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +26,9 @@ from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.range_reading import range_from_cdr
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.standalone import run_node
+from rail_msgs_py.table import TableWriter
+from rail_msgs_py.telegrams import Telegrams, telegrams
+from rail_wayside.authority_parameters import AuthorityParameters, desk_of
 from rail_wayside.zone_map import Zone, ZoneMap
 from rail_wayside.zone_tracking import NOT_HEARD, Fix, Reading, ZoneTracker
 
@@ -30,7 +36,7 @@ _CLOCK_PORT = "clock"
 
 
 @dataclass(frozen=True)
-class ZoneControllerParameters:
+class ZoneControllerParameters(AuthorityParameters):
     """Parameters of the zone controller; arrays over the zones unless said otherwise."""
 
     zones: tuple[str, ...] = parameter((), "names of the zones")
@@ -107,8 +113,9 @@ class ZoneControllerNode(CorridorNode):
         }
         self._writers: dict[tuple[str, str], PositionWriter] = {}
         owners = {zone.name: f"/wayside/{zone.site}" for zone in zone_map.zones.values()}
+        owners |= self._open_desk()
         # The clock is a port like the others: a tick ends though no station answers.
-        self._inbox: TickInbox[Reading | None] = TickInbox([*owners, _CLOCK_PORT])
+        self._inbox: TickInbox[Any] = TickInbox([*owners, _CLOCK_PORT])
         self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
         for zone in zone_map.zones.values():
             self.stream_in(
@@ -120,6 +127,29 @@ class ZoneControllerNode(CorridorNode):
         self.stream_in(topics.CLOCK, self._on_clock)
         self._done = self.stream_out(topics.DONE, node=self.get_fully_qualified_name())
         self.announce_when_connected()
+
+    def _open_desk(self) -> dict[str, str]:
+        """Begin to speak with trains; ports of the base stations and who sends there."""
+        p = self._p
+        self._desk = desk_of(p)
+        self._told = {
+            train: self.publisher(topics.AUTHORITY, train=train).publish
+            for train in (p.trains if self._desk else ())
+        }
+        self._told_tables = {
+            train: TableWriter((train,), topics.AUTHORITY_COLUMNS) for train in self._told
+        }
+        self._down = {base: self.stream_out(topics.DOWN_TELEGRAMS, base=base) for base in p.bases}
+        for base in p.bases:
+            self.stream_in(
+                topics.UP_TELEGRAMS, lambda raw, base=base: self._on_telegrams(base, raw), base=base
+            )
+        return {_port(base): topics.UP_TELEGRAMS.owner(base=base) for base in p.bases}
+
+    def _on_telegrams(self, base: str, raw: bytes) -> None:
+        heard = Telegrams.from_cdr(raw)
+        self._inbox.put(heard.stamp_ns, _port(base), heard)
+        self._advance()
 
     def _on_clock(self, raw: bytes) -> None:
         self._inbox.put(clock_from_cdr(raw), _CLOCK_PORT, None)
@@ -141,12 +171,43 @@ class ZoneControllerNode(CorridorNode):
         self._watch.end()
         fixes = self._tracker.update(
             stamp_ns * 1e-9,
-            {zone: reading for zone, reading in readings.items() if reading is not None},
+            {zone: reading for zone, reading in readings.items() if isinstance(reading, Reading)},
         )
         for fix in fixes:
             self._publish(stamp_ns, fix)
+        self._authorise(stamp_ns, fixes, readings)
         self._report_zones(stamp_ns)
         self._done(header_to_cdr(stamp_ns))
+
+    def _authorise(
+        self, stamp_ns: int, fixes: Iterable[Fix], heard: Mapping[str, Telegrams | Reading | None]
+    ) -> None:
+        """Take the trains' reports of a tick, and give authorities for the next one."""
+        desk, p = self._desk, self._p
+        if desk is None:
+            return
+        for base in p.bases:
+            batch = heard.get(_port(base))
+            for slot, frame in batch.frames if isinstance(batch, Telegrams) else ():
+                desk.receive(base, slot, frame, stamp_ns)
+        numbers = dict(zip(p.trains, p.train_numbers, strict=True))
+        for fix in fixes:
+            segment = p.segments.index(fix.track) if fix.track in p.segments else -1
+            if segment >= 0:
+                place = (segment, fix.chainage_m, fix.variance_m2)
+                desk.ranged(numbers[fix.train], stamp_ns * 1e-9, *place)
+        for base, frames in desk.telegrams(stamp_ns).items():
+            self._down[base](telegrams(stamp_ns, frames))
+        for train, publish in self._told.items():
+            figures = np.array([desk.given(numbers[train], stamp_ns)], dtype=np.float64)
+            publish(self._told_tables[train].write(stamp_ns, figures))
+            trouble = desk.troubles(numbers[train])
+            self.report(
+                DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK,
+                f"{train} authority",
+                trouble or "as it should be",
+                stamp_ns=stamp_ns,
+            )
 
     def _publish(self, stamp_ns: int, fix: Fix) -> None:
         key = (fix.train, fix.track)
@@ -173,6 +234,11 @@ class ZoneControllerNode(CorridorNode):
             f"unidentified train in {unknown}" if unknown else "every train is identified",
             stamp_ns=stamp_ns,
         )
+
+
+def _port(base: str) -> str:
+    """Port of what a base station has received; zones are ports too."""
+    return f"{base}/telegrams"
 
 
 def main() -> None:

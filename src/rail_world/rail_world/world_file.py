@@ -6,11 +6,22 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from rail_world.cbtc_description import CbtcDescription
 from rail_world.description import JunctionDescription, TrackDescription
 from rail_world.network import Network, build_network
 from rail_world.radio_description import RadioDescription
 from rail_world.rail_description import RailDescription
 from rail_world.train_description import TrainDescription
+
+
+class TrainStop(BaseModel):
+    """A train that brakes to a stand by itself, from one time [s] to another."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    train: str
+    from_s: float
+    to_s: float
 
 
 class WorldFile(BaseModel):
@@ -28,6 +39,8 @@ class WorldFile(BaseModel):
     trains: tuple[TrainDescription, ...]
     radio: RadioDescription
     rails: RailDescription | None = None
+    cbtc: CbtcDescription | None = None
+    stops: tuple[TrainStop, ...] = ()
     odometer_error: float = Field(
         0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' relative error"
     )

@@ -2,7 +2,7 @@
 
 Topics out: ``/clock``, ``/world/state``, ``/world/<train>/odometry``, ``/world/<track>/path``,
 ``/world/markers``, ``/world/finished``, ``/<train>/odometer``. Topics in: ``<sink>/done``,
-``/<train>/code_supervision/command``, ``/report/observed``, ``/ready``, ``/failed``.
+``/<train>/<supervision>/command``, ``/report/observed``, ``/ready``, ``/failed``.
 """
 
 from __future__ import annotations
@@ -49,6 +49,9 @@ class WorldParameters:
     clock_readers: int = parameter(0, "readers of the clock that must be connected first", low=0)
     end_when_arrived: bool = parameter(False, "whether to end once every train has arrived")
     supervised: tuple[str, ...] = parameter((), "trains that wait for a command in every tick")
+    supervision: str = parameter(
+        "code_supervision", "name of the node on each of them that commands it"
+    )
     cab_signals: bool = parameter(
         True, "whether drivers keep to the permitted speed before the brake makes them"
     )
@@ -80,6 +83,7 @@ class WorldNode(CorridorNode):
         network = described.network()
         self._tick_ns = described.tick_ns
         self._traffic = Traffic(described.trains, network, described.tick_s)
+        self._stops = described.stops
         self._tick = -1
         self._begun_s = self._started_s = self._created_s = self.steady_s()
         self._observed_ns = 0
@@ -94,7 +98,8 @@ class WorldNode(CorridorNode):
         self._truth_writers: dict[tuple[str, str], PositionWriter] = {}
         self._finish = self.publisher(topics.FINISHED)
         self._supervisors = {
-            train: topics.COMMAND.owner(train=train) for train in self._p.supervised
+            train: topics.COMMAND.owner(train=train, supervision=self._p.supervision)
+            for train in self._p.supervised
         }
         self._odometers = {
             train: self.stream_out(topics.ODOMETER, train=train) for train in self._p.supervised
@@ -113,6 +118,7 @@ class WorldNode(CorridorNode):
                 topics.COMMAND,
                 lambda raw, port=port: self._on_command(raw, port),
                 train=train,
+                supervision=self._p.supervision,
             )
         for sink in self._p.sinks:
             self.stream_in(topics.DONE, lambda raw, sink=sink: self._done(raw, sink), node=sink)
@@ -160,7 +166,7 @@ class WorldNode(CorridorNode):
             return
         self._tick += 1
         if self._tick > 0:
-            self._traffic.step(self._commands)
+            self._traffic.step({**self._commands, **self._stopped(self._tick)})
         stamp_ns = self._tick * self._tick_ns
         self._begun_s = self.steady_s()
         state = self._traffic.state()
@@ -171,6 +177,15 @@ class WorldNode(CorridorNode):
         self._clock(clock_to_cdr(stamp_ns))
         if not self._inbox.ports:
             self._tick_over()
+
+    def _stopped(self, tick: int) -> dict[str, DriveCommand]:
+        """Commands to trains that stop of themselves during a tick."""
+        time_s = tick * self._tick_ns * 1e-9
+        return {
+            stop.train: DriveCommand(emergency_brake=True)
+            for stop in self._stops
+            if stop.from_s <= time_s < stop.to_s
+        }
 
     def _publish_odometers(self, stamp_ns: int) -> None:
         if not self._odometers:

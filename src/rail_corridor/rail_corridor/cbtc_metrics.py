@@ -1,0 +1,142 @@
+"""From a recording to figures: the train radio, its authorities, and what came of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rail_msgs_py.topics import (
+    ATP_COLUMNS,
+    AUTHORITY_COLUMNS,
+    CBTC_LINK_COLUMNS,
+    RADIO_COLUMNS,
+    STATE_COLUMNS,
+)
+
+from .recording import FloatArray, Recording
+from .scenario import Scenario
+from .supervision_metrics import supervision_metrics
+
+#: Fractions of its first track at which the passing of a train's front is timed.
+PASSED_AT: Final = tuple(tenth / 10.0 for tenth in range(1, 10))
+#: What rounding on the wire may take off an authority [m].
+_ROUNDING_M = 0.011
+
+_STATE = {name: index for index, name in enumerate(STATE_COLUMNS)}
+_ATP = {name: index for index, name in enumerate(ATP_COLUMNS)}
+_AUTHORITY = {name: index for index, name in enumerate(AUTHORITY_COLUMNS)}
+_RADIO = {name: index for index, name in enumerate(RADIO_COLUMNS)}
+_LINK = {name: index for index, name in enumerate(CBTC_LINK_COLUMNS)}
+
+
+def cbtc_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
+    """Sections ``cbtc`` and ``atp`` of one train."""
+    ticks = recording.ticks
+    mine = recording.state.upto(ticks)[:, index]
+    on_line = mine[:, _STATE["on_line"]] > 0.0
+    atp = recording.atp.upto(ticks)[:, index]
+    given = recording.authority.upto(ticks)[:, index]
+    radio = recording.radio.upto(ticks)[:, index]
+    links = recording.cbtc_links.upto(ticks)[:, index]
+    front_m = mine[:, _STATE["chainage_m"]]
+    end_m = atp[:, _ATP["end_of_authority_m"]]
+    passed = on_line & (front_m > end_m) & (np.abs(mine[:, _STATE["speed_mps"]]) > 0.0)
+    return {
+        "cbtc": _link(scenario, on_line, atp, given, radio, links)
+        | _location(on_line, front_m, atp)
+        | {"passed_s": _passed_s(scenario, index, mine, on_line)},
+        "atp": supervision_metrics(scenario, recording, index, on_line)
+        | {"passed_authority": int(np.count_nonzero(passed))},
+    }
+
+
+def _link(
+    scenario: Scenario,
+    on_line: NDArray[np.bool_],
+    atp: FloatArray,
+    given: FloatArray,
+    radio: FloatArray,
+    links: FloatArray,
+) -> dict[str, Any]:
+    """Frames both ways, and how old the authority on board was."""
+    age_s = atp[on_line, _ATP["authority_age_s"]]
+    age_s = age_s[np.isfinite(age_s)]
+    accepted = _last(atp, _ATP["accepted"]) + _last(given, _AUTHORITY["accepted"])
+    lost = _last(atp, _ATP["lost"]) + _last(given, _AUTHORITY["lost"])
+    rejected = _last(atp, _ATP["rejected"]) + _last(given, _AUTHORITY["rejected"])
+    channel = radio[:, _RADIO["channel"]]
+    changes = (channel[1:] != channel[:-1]) & (channel[:-1] > 0)
+    snr = links[on_line, _LINK["snr_down"]]
+    snr = snr[snr > 0.0]
+    lost_s = np.count_nonzero(age_s > scenario.cbtc.timeout_s) if scenario.cbtc else 0
+    return {
+        "frames": int(accepted + lost),
+        "lost": int(lost),
+        "rejected": int(rejected),
+        "forged_accepted": _forged(atp, given),
+        "age_median_s": float(np.median(age_s)) if age_s.size else None,
+        "age_p95_s": float(np.quantile(age_s, 0.95)) if age_s.size else None,
+        "without_authority_s": float(lost_s * scenario.tick_s),
+        "handovers": int(np.count_nonzero(changes & on_line[1:])),
+        "snr_db": float(10.0 * np.log10(np.mean(snr))) if snr.size else None,
+    }
+
+
+def _passed_s(
+    scenario: Scenario, index: int, mine: FloatArray, on_line: NDArray[np.bool_]
+) -> list[float | None]:
+    """Time at which the front passed each of `PASSED_AT` [s], None if it did not."""
+    name = scenario.trains[index].route[0]
+    there = on_line & (mine[:, _STATE["track_index"]] == list(scenario.tracks).index(name))
+    times_s = (np.flatnonzero(there) + 1) * scenario.tick_s
+    front_m = mine[there, _STATE["chainage_m"]]
+    length_m = scenario.network.tracks[name].length_m
+    passed: list[float | None] = []
+    for fraction in PASSED_AT:
+        beyond = np.flatnonzero(front_m >= fraction * length_m)
+        if not beyond.size or beyond[0] == 0:  # it never came there, or was put there
+            passed.append(None)
+            continue
+        after = int(beyond[0])
+        pair = slice(after - 1, after + 1)
+        passed.append(float(np.interp(fraction * length_m, front_m[pair], times_s[pair])))
+    return passed
+
+
+def _last(table: FloatArray, column: int) -> float:
+    """The last figure of a running count."""
+    counts = table[:, column]
+    counts = counts[~np.isnan(counts)]
+    return float(counts[-1]) if counts.size else 0.0
+
+
+def _forged(atp: FloatArray, given: FloatArray) -> int:
+    """Authorities in force on board that nobody has given to this train."""
+    issued = given[:, _AUTHORITY["end_of_authority_m"]]
+    issued = np.unique(issued[np.isfinite(issued)])
+    held = atp[:, _ATP["end_of_authority_m"]]
+    held = np.unique(held[np.isfinite(held)])
+    if not issued.size:
+        return int(held.size)
+    near = np.clip(np.searchsorted(issued, held - 1e-6), 0, issued.size - 1)
+    return int(np.count_nonzero(np.abs(issued[near] - held) > _ROUNDING_M))
+
+
+def _location(
+    on_line: NDArray[np.bool_], front_m: FloatArray, atp: FloatArray
+) -> dict[str, float | int | None]:
+    """Where the train believed to be, against the truth."""
+    error_m = np.abs(atp[:, _ATP["front_m"]] - front_m)
+    half_m = atp[:, _ATP["uncertainty_m"]]
+    known = on_line & np.isfinite(error_m) & np.isfinite(half_m)
+    if not known.any():
+        return {"located": 0.0, "location_rmse_m": None, "uncertainty_m": None, "mislocated": 0}
+    return {
+        "located": float(np.count_nonzero(known) / np.count_nonzero(on_line)),
+        "location_rmse_m": float(math.sqrt(np.mean(error_m[known] ** 2))),
+        "uncertainty_m": float(np.median(half_m[known])),
+        "mislocated": int(np.count_nonzero(error_m[known] > half_m[known])),
+    }

@@ -1,0 +1,125 @@
+"""Topics of train control by radio; part of the table in `rail_msgs_py.topics`."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from std_msgs.msg import Float64MultiArray, UInt8MultiArray
+
+from rail_msgs_py.qos import ESTIMATE, STREAM
+from rail_msgs_py.table import Table
+from rail_msgs_py.telegrams import Telegrams
+from rail_msgs_py.topic import Topic
+from rail_msgs_py.waveform import Waveform
+
+CBTC_BASE_TX: Final = Topic(
+    "/wayside/{base}/cbtc/downlink",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "cbtc_base_station",
+    "cbtc_medium",
+    "What both antennas of a base station send in the tick: its beacon and the bursts to trains.",
+)
+CBTC_BASE_RX: Final = Topic(
+    "/wayside/{base}/cbtc/uplink",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "cbtc_medium",
+    "cbtc_base_station",
+    "What they receive: one slot per train, without a sample where no train is in reach.",
+)
+CBTC_TRAIN_TX: Final = Topic(
+    "/{train}/cbtc_radio/uplink",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "cbtc_radio",
+    "cbtc_medium",
+    "The burst that the antennas of a train send in its slot, on the uplink in force.",
+)
+CBTC_TRAIN_RX: Final = Topic(
+    "/{train}/cbtc_radio/channel_{channel}/downlink",
+    Float64MultiArray,
+    STREAM,
+    Waveform,
+    "cbtc_medium",
+    "cbtc_radio",
+    "What they receive on one downlink channel: the slot of the beacon, then the train's own.",
+)
+DOWN_TELEGRAMS: Final = Topic(
+    "/wayside/zone_controller/{base}/telegrams",
+    UInt8MultiArray,
+    STREAM,
+    Telegrams,
+    "zone_controller",
+    "cbtc_base_station",
+    "Frames for the trains of a base station, sent in the next tick.",
+)
+UP_TELEGRAMS: Final = Topic(
+    "/wayside/{base}/cbtc/telegrams",
+    UInt8MultiArray,
+    STREAM,
+    Telegrams,
+    "cbtc_base_station",
+    "zone_controller",
+    "Frames that the base station has received in the tick.",
+)
+TRAIN_TELEGRAMS: Final = Topic(
+    "/{train}/atp/telegrams",
+    UInt8MultiArray,
+    STREAM,
+    Telegrams,
+    "atp",
+    "cbtc_radio",
+    "The frame that the train sends in the next tick.",
+)
+RADIO_TELEGRAMS: Final = Topic(
+    "/{train}/cbtc_radio/telegrams",
+    UInt8MultiArray,
+    STREAM,
+    Telegrams,
+    "cbtc_radio",
+    "atp",
+    "Frames that the train has received in the tick.",
+)
+RADIO_LINK: Final = Topic(
+    "/{train}/cbtc_radio/link",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "cbtc_radio",
+    "people, the report",
+    "Channel in force after the tick, the beacon's signal-to-noise ratio on it, bursts heard.",
+)
+CBTC_LINKS: Final = Topic(
+    "/world/cbtc_medium/links",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "cbtc_medium",
+    "the report",
+    "The truth of each train's best link: its base station and the mean signal-to-noise ratio "
+    "per sample at one antenna, both ways.",
+)
+ATP_STATE: Final = Topic(
+    "/{train}/atp/state",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "atp",
+    "people, the report",
+    "Where the train believes its front to be, its authority and how old that is, and counts of "
+    "frames accepted, lost and rejected.",
+)
+AUTHORITY: Final = Topic(
+    "/wayside/zone_controller/{train}/authority",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "zone_controller",
+    "people, the report",
+    "The movement authority given to a train, and counts of its reports accepted, lost and "
+    "rejected.",
+)

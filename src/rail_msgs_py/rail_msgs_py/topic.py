@@ -1,0 +1,57 @@
+"""One kind of topic of the corridor."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.qos import QoSProfile
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One kind of topic.
+
+    Parameters
+    ----------
+    pattern : str
+        Absolute name with ``{placeholders}`` in names of their own level.
+    type : message class
+    qos : QoSProfile
+    view : class with ``from_msg``, or None
+        How ``rail echo`` decodes it.
+    sender, readers, text : str
+        For the documentation.
+    """
+
+    pattern: str
+    type: Any
+    qos: QoSProfile
+    view: Any
+    sender: str
+    readers: str
+    text: str
+
+    def name(self, **parts: object) -> str:
+        """Absolute name with the placeholders filled in.
+
+        >>> from rail_msgs_py.topics import RANGE
+        >>> RANGE.name(site="wrs1", zone="zone1")
+        '/wayside/wrs1/zone1/range'
+        """
+        return self.pattern.format(**parts)
+
+    def owner(self, **parts: object) -> str:
+        """Full name of the node that sends it, where the topic is named below its node.
+
+        >>> from rail_msgs_py.topics import OCCUPANCY
+        >>> OCCUPANCY.owner(circuit="tc1")
+        '/wayside/tc1/track_code'
+        """
+        return self.name(**parts).rpartition("/")[0]
+
+    def matches(self, name: str) -> bool:
+        """Whether ``name`` is of this kind."""
+        expression = re.sub(r"\\\{\w+\\\}", r"[^/]+", re.escape(self.pattern))
+        return re.fullmatch(expression, name) is not None

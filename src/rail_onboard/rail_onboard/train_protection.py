@@ -1,0 +1,143 @@
+"""Automatic train protection: what a train does with the frames that reach it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import inf, nan
+
+from rail_msgs_py.movement_authority import MovementAuthority
+from rail_msgs_py.safe_channel import SafeChannel
+from rail_msgs_py.safe_frame import Kind
+from rail_msgs_py.safe_result import Accepted, Reason, Rejected
+from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.train_report import FASTEST_MPS, WIDEST_M, LocationReport
+from rail_onboard.authority_supervision import Authority, AuthoritySupervision
+from rail_onboard.code_supervision import SupervisionOutput
+from rail_onboard.train_location import TrainLocation
+
+
+@dataclass(frozen=True)
+class TrainIdentity:
+    """What a train is and where it was put into service.
+
+    ``number`` as in the telegrams, ``segment`` its track, ``start_m`` the chainage of its front
+    there, known within ``placed_m``; ``length_m`` over couplers.
+    """
+
+    number: int
+    segment: int
+    start_m: float
+    placed_m: float
+    length_m: float
+    direction: int = 1
+
+
+class TrainProtection:
+    """Takes frames and the odometer, gives the train's own frame and what it may do.
+
+    Parameters
+    ----------
+    identity : TrainIdentity
+    channel : SafeChannel
+        To the zone controller.
+    location : TrainLocation
+    supervision : AuthoritySupervision
+    """
+
+    def __init__(
+        self,
+        identity: TrainIdentity,
+        channel: SafeChannel,
+        location: TrainLocation,
+        supervision: AuthoritySupervision,
+    ) -> None:
+        self._identity, self._channel = identity, channel
+        self._location, self._supervision = location, supervision
+        self._placed = False
+        self.accepted = self.lost = self.rejected = 0
+
+    def tick(
+        self, time_ns: int, distance_m: float, speed_mps: float, frames: Iterable[bytes]
+    ) -> SupervisionOutput:
+        """One tick: odometer and frames received in it."""
+        time_s = time_ns / NANOSECONDS
+        self._location.update(time_s, distance_m, speed_mps)
+        if not self._placed:
+            train = self._identity
+            self._placed = self._location.fix(time_s, train.start_m, train.placed_m)
+        newest: Authority | None = None
+        for frame in frames:
+            authority = self._read(frame, time_ns)
+            if authority is not None and (newest is None or authority.sealed_s > newest.sealed_s):
+                newest = authority
+        here = self._location.location(time_s)
+        return self._supervision.update(time_s, here, speed_mps, authority=newest)
+
+    def _read(self, frame: bytes, time_ns: int) -> Authority | None:
+        opened = self._channel.open(frame, time_ns)
+        if isinstance(opened, Rejected):
+            # What came through two base stations is no attack.
+            self.rejected += opened.reason is not Reason.REPEATED
+            return None
+        if not isinstance(opened, Accepted):
+            return None
+        self.accepted += 1
+        self.lost += opened.lost
+        train = self._identity
+        try:
+            told = MovementAuthority.from_bytes(opened.payload)
+        except ValueError:
+            self.rejected += 1
+            return None
+        if (told.train, told.segment, told.direction) != (
+            train.number,
+            train.segment,
+            train.direction,
+        ):
+            self.rejected += 1
+            return None
+        sealed_s = time_ns / NANOSECONDS - opened.age_s
+        if told.located is not None:
+            self._location.fix(sealed_s, *told.located)
+        return Authority(
+            sealed_s,
+            told.end_of_authority_m,
+            told.limit_mps,
+            tuple((step.from_m, step.limit_mps) for step in told.steps),
+            told.validity_s,
+            told.emergency_stop,
+        )
+
+    def frame(self, time_ns: int, speed_mps: float) -> bytes:
+        """The train's own frame, which tells where it is at this time."""
+        train = self._identity
+        here = self._location.location(time_ns / NANOSECONDS)
+        valid = here.valid and here.uncertainty_m <= WIDEST_M
+        report = LocationReport(
+            train.number,
+            train.segment,
+            here.position_m if valid else 0.0,
+            train.direction,
+            min(abs(speed_mps), FASTEST_MPS),
+            here.uncertainty_m if valid else WIDEST_M,
+            train.length_m,
+            True,
+            valid,
+        )
+        return self._channel.seal(Kind.LOCATION_REPORT, report.to_bytes(), time_ns)
+
+    def figures(self, time_ns: int) -> tuple[float, ...]:
+        """Figures as ``rail_msgs_py.topics.ATP_COLUMNS``; NaN where there is none."""
+        time_s = time_ns / NANOSECONDS
+        here = self._location.location(time_s)
+        held = self._supervision.authority
+        return (
+            here.position_m if here.valid else nan,
+            here.uncertainty_m if here.valid else inf,
+            nan if held is None else held.end_m,
+            inf if held is None else time_s - held.sealed_s,
+            self.accepted,
+            self.lost,
+            self.rejected,
+        )

@@ -239,7 +239,7 @@ def run_checks(pytest_arguments: list[str]) -> int:
             print(f"== {name}", flush=True)
             if subprocess.run(command, cwd=ROOT, env=env, check=False).returncode:
                 failed.append(name)
-        # Tests marked `system` share one worker (tests/conftest.py), the rest fill the other.
+        # Tests marked `system` come in two groups, each on one worker (tests/conftest.py).
         pytest_arguments = ["-n", "2", "--dist", "loadgroup", "--timeout", "300", "-q"]
     print("== pytest", flush=True)
     command = [python, "-m", "pytest", *pytest_arguments]

@@ -39,9 +39,16 @@ def ros_domain() -> Iterator[int]:
     raise RuntimeError("every domain is taken")
 
 
+_ONLY_RUN = {"test_kill_campaign", "test_track_codes", "test_train_radio", "test_placement"}
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put every system test on one worker: they start processes and must not compete."""
+    """Put system tests into two groups, one after the other within each: they start processes.
+
+    Those that look at the wall clock are in the first; the second only runs corridors to their end.
+    """
     for item in items:
         if item.get_closest_marker("system"):
-            item.add_marker(pytest.mark.xdist_group("system"))
+            calm = item.path.stem in _ONLY_RUN
+            item.add_marker(pytest.mark.xdist_group("system_runs" if calm else "system"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rail_wayside.zone_map import Zone, ZoneMap
-from rail_wayside.zone_tracking import GATE_M, Fix, Reading, ZoneTracker
+from rail_wayside.zone_tracking import CONFIRMED_S, GATE_M, Fix, Reading, ZoneTracker
 
 TICK_S = 0.1
 LENGTH_M = 200.0
@@ -251,8 +251,9 @@ def test_trains_that_part_again_are_told_apart_again() -> None:
                 assert abs(wayside.error_m(fix)) < GATE_M
             else:
                 flagged += 1
-    # Together in z3 from 0.8 s to 2.0 s.
-    assert 20 <= flagged <= 30
+    # Together in z3 from 0.8 s to 2.0 s, both flagged; then one is to be confirmed.
+    confirming = round(CONFIRMED_S / 0.1)
+    assert 20 + confirming <= flagged <= 30 + 2 * confirming
     assert (fixes["a"].zone, fixes["b"].zone) == ("z4", "z3")
     assert all(known(fix) for fix in fixes.values())
 
@@ -272,10 +273,10 @@ def test_a_train_is_lost_and_found(how: str) -> None:
         else:
             lost_s.append(time_s)
             assert fix.reason
-    # Zone z3 is from 12.5 s to 22.5 s; one tick of grace at either end.
+    # Zone z3 is from 12.5 s to 22.5 s; one tick of grace at either end, and it is to be confirmed.
     assert lost_s[0] == pytest.approx(12.5, abs=0.11)
-    assert lost_s[-1] == pytest.approx(22.4, abs=0.21)
-    assert len(lost_s) == pytest.approx(100, abs=3)
+    assert lost_s[-1] == pytest.approx(22.4 + CONFIRMED_S, abs=0.21)
+    assert len(lost_s) == pytest.approx(100 + 10 * CONFIRMED_S, abs=3)
     assert known(fix)
 
 

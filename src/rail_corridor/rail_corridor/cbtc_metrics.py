@@ -42,15 +42,54 @@ def cbtc_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[s
     radio = recording.radio.upto(ticks)[:, index]
     links = recording.cbtc_links.upto(ticks)[:, index]
     front_m = mine[:, _STATE["chainage_m"]]
-    end_m = atp[:, _ATP["end_of_authority_m"]]
-    passed = on_line & (front_m > end_m) & (np.abs(mine[:, _STATE["speed_mps"]]) > 0.0)
+    end_m = _held(atp[:, _ATP["end_of_authority_m"]], atp[:, _ATP["accepted"]])
+    speed_mps = np.abs(mine[:, _STATE["speed_mps"]])
+    passed, withdrawn = _passed(scenario, on_line, front_m, speed_mps, end_m)
     return {
         "cbtc": _link(scenario, on_line, atp, given, radio, links)
         | _location(on_line, front_m, atp)
         | {"passed_s": _passed_s(scenario, index, mine, on_line)},
         "atp": supervision_metrics(scenario, recording, index, on_line)
-        | {"passed_authority": int(np.count_nonzero(passed))},
+        | {"passed_authority": passed, "authority_withdrawn": withdrawn},
     }
+
+
+def _passed(
+    scenario: Scenario,
+    on_line: NDArray[np.bool_],
+    front_m: FloatArray,
+    speed_mps: FloatArray,
+    end_m: FloatArray,
+) -> tuple[int, int]:
+    """Ticks in which a moving train was past its end, and authorities withdrawn.
+
+    One is withdrawn if it is cut to where no brake can stop the train any more, as when the wayside
+    finds reports and ranges in disagreement; the train brakes, and until it stands it is not
+    counted as past its end.
+    """
+    plan = scenario.cbtc
+    braking_mps2 = plan.emergency_mps2 if plan else 1.0
+    delay_s = 3.0 * scenario.tick_s
+    passed = withdrawn = 0
+    excused = False
+    for tick in np.flatnonzero(on_line).tolist():
+        v = speed_mps[tick]
+        way_m = v * delay_s + 0.5 * v * v / braking_mps2
+        cut = tick > 0 and end_m[tick] < end_m[tick - 1] - 1.0
+        if cut and end_m[tick] < front_m[tick] + way_m:
+            withdrawn += not excused
+            excused = True
+        elif v == 0.0 or front_m[tick] <= end_m[tick] - way_m:
+            excused = False
+        passed += bool(v > 0.0 and front_m[tick] > end_m[tick] and not excused)
+    return passed, withdrawn
+
+
+def _held(end_m: FloatArray, accepted: FloatArray) -> FloatArray:
+    """End of authority, the last one where the protection has fallen silent."""
+    silent = np.isnan(accepted)
+    last = np.maximum.accumulate(np.where(silent, 0, np.arange(len(end_m))))
+    return np.where(silent, end_m[last], end_m)
 
 
 def _link(

@@ -209,10 +209,12 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
     limits = {name: limit_steps(track) for name, track in tracks.items()}
     numbers = {train.name: number for number, train in enumerate(scenario.trains, start=1)}
     by_departure = sorted(scenario.trains, key=lambda train: train.depart_s)
+    # Where trains go on to the next control area, the track does not end for them.
+    beyond_m = _BEYOND_M if all(train.leaves_on_arrival for train in by_departure) else 0.0
     return {
         "bases": tuple(base.name for base in scenario.bases),
         "segments": tuple(tracks),
-        "segment_lengths_m": tuple(track.length_m for track in tracks.values()),
+        "segment_lengths_m": tuple(track.length_m + beyond_m for track in tracks.values()),
         "limit_counts": tuple(len(steps) for steps in limits.values()),
         "limit_from_m": tuple(at for steps in limits.values() for at, _ in steps),
         "limits_mps": tuple(mps for steps in limits.values() for _, mps in steps),
@@ -224,8 +226,6 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
             tracks[train.route[0]].length_m if train.leaves_on_arrival else 0.0
             for train in by_departure
         ),
-        # Where trains go on to the next control area the track does not end for them.
-        "end_margin_m": -_BEYOND_M if all(t.leaves_on_arrival for t in by_departure) else 0.0,
         "placed_m": _PLACED_M,
         "margin_m": plan.margin_m,
         "validity_s": plan.timeout_s,

@@ -115,6 +115,12 @@ def run(
             "--timeout", help="Wall time after which a silent node is given up [s].", metavar="S"
         ),
     ] = 30.0,
+    kill: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--kill", help="Kill this node at this simulated time; repeatable.", metavar="NODE@S"
+        ),
+    ] = None,
 ) -> None:
     """Run a corridor, and report."""
     import math
@@ -127,6 +133,9 @@ def run(
         raise UsageError(f"--timeout: {timeout}: must be from 0.5 to 3600 s")
     if report is not None:
         _check_writable("--report", report)
+    from .kills import parse_kill
+
+    kills = tuple(parse_kill(text) for text in kill or ())
     loaded = _load(scenario, seed, duration, track, trains, zone_length)
 
     from rich.console import Console
@@ -135,7 +144,7 @@ def run(
     from .launcher import run as run_corridor
 
     options = RunOptions(  # type: ignore[arg-type]
-        rate, processes, only, report, timeout, tuple(external or ())
+        rate, processes, only, report, timeout, tuple(external or ()), kills
     )
     raise typer.Exit(run_corridor(loaded, options, Console()))  # type: ignore[arg-type]
 
@@ -249,17 +258,30 @@ def bench(
 
 @app.command()
 def campaign(
-    what: Annotated[str, typer.Argument(help="What to put to the test: handover.", metavar="WHAT")],
+    what: Annotated[
+        str,
+        typer.Argument(help="What to put to the test: handover, threats, kills.", metavar="WHAT"),
+    ],
     crossings: Annotated[
-        int, typer.Option("--crossings", help="At least so many per situation.", metavar="N")
+        int, typer.Option("--crossings", help="handover: at least so many each.", metavar="N")
     ] = 200,
+    runs: Annotated[
+        int, typer.Option("--runs", help="kills: runs, of one seed each.", metavar="N")
+    ] = 100,
+    frames: Annotated[
+        int, typer.Option("--frames", help="threats: frames under each.", metavar="N")
+    ] = 100_000,
     seed: Annotated[int, typer.Option("--seed", help="Seed of the first run.", metavar="N")] = 1,
     json: Annotated[
         Path | None, typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
     ] = None,
 ) -> None:
     """Run many generated scenarios and count what must not happen; exit code 1 if it did."""
-    _choice("WHAT", what, ("handover",))
+    _choice("WHAT", what, ("handover", "threats", "kills"))
+    if not 1 <= frames <= 100_000_000:
+        raise UsageError(f"--frames: {frames}: must be from 1 to 100000000")
+    if not 1 <= runs <= 1_000_000:
+        raise UsageError(f"--runs: {runs}: must be from 1 to 1000000")
     if not 1 <= crossings <= 1_000_000:
         raise UsageError(f"--crossings: {crossings}: must be from 1 to 1000000")
     if not 0 <= seed < 2**62:
@@ -273,6 +295,14 @@ def campaign(
     from .campaign_scenarios import situations
 
     console = Console()
+    if what == "kills":
+        from .kill_campaign import kill_campaign
+
+        raise typer.Exit(kill_campaign(runs, seed, console, json))
+    if what == "threats":
+        from .threat_table import threat_campaign
+
+        raise typer.Exit(threat_campaign(frames, seed, console, json))
     rows: list[Row] = []
     try:
         rows.extend(run_campaign(situations(), crossings, seed, console))
@@ -286,6 +316,32 @@ def campaign(
     if json is not None:
         write_rows(rows, json)
     raise typer.Exit(1 if any(row.violations for row in rows) else 0)
+
+
+@app.command()
+def sweep(
+    what: Annotated[str, typer.Argument(help="What to vary: link_margin.", metavar="WHAT")],
+    out: Annotated[
+        Path, typer.Option("--out", help="Folder for picture and figures.", metavar="DIR")
+    ] = Path("link_margin"),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points.")] = False,
+) -> None:
+    """Run one situation over a range of parameters: a table, a picture, and JSON."""
+    _choice("WHAT", what, ("link_margin",))
+    if out.exists() and not out.is_dir():
+        raise UsageError(f"--out: {out}: is not a directory")
+    _check_writable("--out", out / "any")
+
+    from rich.console import Console
+
+    from .campaign import RunFailedError
+    from .link_margin import run_link_margin
+
+    try:
+        run_link_margin(out, quick, Console())
+    except RunFailedError as error:
+        print(f"rail: {error}", file=sys.stderr)
+        raise typer.Exit(1) from None
 
 
 def main() -> None:

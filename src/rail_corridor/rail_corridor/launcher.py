@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 
 from .domain import sole_corridor
 from .host import make_nodes, node_class, run_nodes
+from .kills import Executioner, Kill, check_kills
 from .middleware import discover_on
 from .plan import WORLD, Placement, Plan, check_external, make_plan
 from .processes import ProcessGroup, remove_orphaned_segments
@@ -38,6 +39,7 @@ class RunOptions:
     report: Path | None = None
     timeout_s: float = 30.0
     external: tuple[str, ...] = ()
+    kills: tuple[Kill, ...] = ()
 
 
 def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
@@ -85,6 +87,7 @@ class _Run:
         self._here = [spec for specs in self._groups.values() for spec in specs]
         if placement != "one":
             self._here.clear()
+        check_kills(options.kills, self._groups, WORLD, one=bool(self._here))
         self._processes = ProcessGroup()
         self._signal = 0
         self._world_failed = False
@@ -151,6 +154,7 @@ class _Run:
         executor = EventsExecutor(context=context)
         for node in nodes:
             executor.add_node(node)
+        self._arrange_kills(executor, nodes)
         with Progress(
             TextColumn("{task.description}"),
             BarColumn(bar_width=None),
@@ -169,6 +173,31 @@ class _Run:
         for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown(context=context)
+
+    def _arrange_kills(self, executor: Any, nodes: list[Any]) -> None:
+        """Kill equipment in the tick that its time falls into."""
+        observer, kills = self._observer, self._options.kills
+        if not kills:
+            return
+        from rail_msgs_py import topics
+        from rail_msgs_py.table import figures_from_cdr
+
+        process = {spec.name: name for name, specs in self._groups.items() for spec in specs}
+        here = {node.get_fully_qualified_name(): node for node in nodes if node is not observer}
+
+        def kill(name: str) -> None:
+            if name not in here:
+                self._processes.kill(process[name])
+                return
+            # Not destroyed before the end: what is under way to it would find no handle.
+            executor.remove_node(here[name])
+            observer.announce_failure(name, "killed")
+
+        executioner = Executioner(kills, kill)
+        shape = len(self._scenario.trains), len(topics.STATE_COLUMNS)
+        observer.stream_in(
+            topics.STATE, lambda raw: executioner.tick(figures_from_cdr(raw, *shape)[0])
+        )
 
     def _drain(self, executor: Any) -> None:
         """Read what was sent before the end."""

@@ -98,6 +98,12 @@ class ProcessGroup:
                 ended.append(child)
         return ended
 
+    def kill(self, name: str) -> None:
+        """Kill a process; `poll` tells of its end."""
+        for child in self._alive():
+            if child.name == name:
+                os.kill(child.pid, signal.SIGKILL)
+
     def stop(self, grace_s: float = GRACE_S) -> None:
         """End every child: asked first, then killed."""
         self._signal(signal.SIGTERM)

@@ -43,6 +43,7 @@ def supervision_metrics(
         "emergency_brakes": rises(emergency & moving),
         "overspeed_s": float(np.count_nonzero(over) * scenario.tick_s),
         "above_permitted_s": float(np.count_nonzero(beyond) * scenario.tick_s),
+        "speed_at_end_mps": float(speed_mps[-1]) if on_line.size and on_line[-1] else None,
         "margin_min_m": margin_m if math.isfinite(margin_m) else None,
     }
 

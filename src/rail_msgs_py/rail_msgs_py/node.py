@@ -75,9 +75,7 @@ class CorridorMixin:
         self._subscribe(topic.type, name, callback, topic.qos, raw=True)
         self._connections.append(lambda: self.count_publishers(name) > 0)
 
-    def listen(
-        self: Any, topic: Topic, callback: Callable[[Any], None], **parts: object
-    ) -> None:
+    def listen(self: Any, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         """Subscribe to messages of a topic that nothing waits for."""
         self._subscribe(topic.type, topic.name(**parts), callback, topic.qos, raw=False)
 

@@ -145,8 +145,10 @@ class CbtcRadioNode(Equipment):
         frames: list[tuple[int, bytes]] = []
         beacons: dict[int, float] = {}
         if self.switched_on and heard:
-            # Of each channel the beacon and the train's own slot.
-            cut = np.stack([self._slots.cut(heard[channel]) for channel in sorted(heard)])
+            # Of each channel the beacon and the train's own slot, by the antennas of the scheme.
+            antennas = self._slots.burst.scheme.receive
+            blocks = [heard[channel][:antennas] for channel in sorted(heard)]
+            cut = np.stack([self._slots.cut(block) for block in blocks])
             found = self._receiver.receive(cut, doppler_hz=self._p.doppler_hz)
             for row, channel in enumerate(sorted(heard)):
                 if found.detected[row, 0]:

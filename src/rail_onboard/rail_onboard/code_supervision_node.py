@@ -59,9 +59,7 @@ class CodeSupervisionNode(Equipment):
             braking_mps2=self._p.braking_mps2, odometer_error=self._p.odometer_error
         )
         train = namespace.strip("/")
-        self._publish = self.stream_out(
-            topics.COMMAND, train=train, supervision=self.get_name()
-        )
+        self._publish = self.stream_out(topics.COMMAND, train=train, supervision=self.get_name())
         self._table = TableWriter((train,), topics.COMMAND_COLUMNS)
         self._inbox: TickInbox[Any] = TickInbox([_CODE, _ODOMETER])
         receiver = topics.CODE_RECEIVED.owner(train=train)

@@ -18,6 +18,7 @@ from rail_msgs_py.safe_result import Accepted, Reason, Rejected
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.train_report import LocationReport
 from rail_wayside.moving_block import Authority, MovingBlock, to_telegram
+from rail_wayside.train_bounds import Trouble
 
 #: A frame that came through two base stations is no attack.
 _HARMLESS = Reason.REPEATED
@@ -30,7 +31,7 @@ class _Caller:
     channel: SafeChannel
     leaves_at_m: float
     base: str | None = None
-    place: tuple[float, float] | None = None  # ranged at the present time, with its half-width
+    place: tuple[float, float, float] | None = None  # time, ranged then, half-width
     held: Authority | None = None
     accepted: int = 0
     lost: int = 0
@@ -109,12 +110,14 @@ class AuthorityDesk:
     ) -> None:
         """Take the position of a train by phase ranging; an infinite variance = not known."""
         caller = self._callers[number]
-        caller.place = None
         if not (isfinite(position_m) and isfinite(variance_m2)):
             return
         sigma_m = sqrt(variance_m2)
-        self._block.ranged(number, time_s, segment, position_m, sigma_m)
-        caller.place = position_m, self._sigmas * sigma_m
+        taken = self._block.ranged(number, time_s, segment, position_m, sigma_m)
+        # A range that contradicts what the train reports is nothing to tell it.
+        doubtful = {Trouble.RANGE, Trouble.RANGE_SEGMENT, Trouble.LEAP}
+        if taken and not doubtful.intersection(self._block.troubles(number)):
+            caller.place = time_s, position_m, self._sigmas * sigma_m
 
     def telegrams(self, time_ns: int) -> dict[str, list[tuple[int, bytes]]]:
         """Frames for every train, by base station, each with its slot."""
@@ -124,7 +127,7 @@ class AuthorityDesk:
             caller.held = authority
             if authority is None:
                 continue
-            told = to_telegram(authority, caller.place)
+            told = to_telegram(authority, _now(caller.place, time_ns / NANOSECONDS))
             frame = caller.channel.seal(Kind.MOVEMENT_AUTHORITY, told.to_bytes(), time_ns)
             for base in self._bases if caller.base is None else (caller.base,):
                 out[base].append((number, frame))
@@ -148,3 +151,8 @@ class AuthorityDesk:
     def troubles(self, number: int) -> str:
         """What does not fit about a train; empty if all does."""
         return ", ".join(trouble.value for trouble in self._block.troubles(number))
+
+
+def _now(place: tuple[float, float, float] | None, time_s: float) -> tuple[float, float] | None:
+    """Place and half-width, if they are of this very time."""
+    return place[1:] if place is not None and abs(place[0] - time_s) < 1e-6 else None

@@ -44,7 +44,7 @@ class AuthorityParameters:
     placed_m: float = parameter(1.0, "how well the fronts are known at first", unit="m", low=0.0)
     margin_m: float = parameter(10.0, "kept behind a train", unit="m", low=0.0, high=1e4)
     end_margin_m: float = parameter(
-        5.0, "kept before the end of a track", unit="m", low=-1e4, high=1e4
+        5.0, "kept before the end of a track", unit="m", low=0.0, high=1e4
     )
     validity_s: float = parameter(3.0, "of an authority", unit="s", low=0.1, high=600.0)
     fix_sigmas: float = parameter(4.0, "half-width of ranges told to trains", low=1.0, high=20.0)

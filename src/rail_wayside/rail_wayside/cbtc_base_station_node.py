@@ -117,7 +117,8 @@ class CbtcBaseStationNode(Equipment):
         block = Waveform.from_cdr(raw)
         frames: list[tuple[int, bytes]] = []
         if self.switched_on:
-            cut = self._slots.cut(block.samples)
+            # Where a scheme sends by two antennas and receives by one, that is the first.
+            cut = self._slots.cut(block.samples[: self._slots.burst.scheme.receive])
             used = [slot for slot in range(1, len(cut)) if cut[slot, 0, 0] or cut[slot].any()]
             found = self._receiver.receive(cut[used], doppler_hz=self._p.doppler_hz)
             frames = [

@@ -10,12 +10,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rail_wayside.association import FOLLOWED_S, Candidate, LineOrder, associate
 from rail_wayside.zone_map import ZoneMap
 
 MAX_ACCELERATION_MPS2 = 2.0
+#: A train that had been lost is claimed to be known only after so long: what came back may be
+#: another one's signal, or two stations' on one channel.
+CONFIRMED_S = 1.5
 GATE_M = 12.0
 SIGMAS = 6.0
 MAX_SPEED_MPS = 160.0
@@ -55,6 +58,7 @@ class _Train:
     chainage_m: float
     entered: bool = False
     seen_s: float = 0.0
+    regained_s: float = -math.inf
     speed_mps: float = 0.0
     # Covariance of the filter on (chainage, speed).
     p_ss: float = 0.0
@@ -179,6 +183,8 @@ class ZoneTracker:
             train.p_ss, train.p_sv, train.p_vv = place.variance_m2, 0.0, 30.0**2
         else:
             elapsed_s = time_s - train.seen_s
+            if elapsed_s > FOLLOWED_S:
+                train.regained_s = time_s
             way_m = self._map.way_m(train.zone, train.filtered_m, place.zone, place.chainage_m)
             assert way_m is not None
             noise = ACCELERATION_SIGMA_MPS2**2
@@ -226,6 +232,11 @@ class ZoneTracker:
             outside_m = train.fix.chainage_m - zone.end_m
             if outside_m > 0.5 * zone.length_m:
                 return _with_reason(train.fix, self._beyond(train.zone))
+            if train.seen_s - train.regained_s < CONFIRMED_S:
+                reason = f"found again in {train.zone}, not confirmed yet"
+                return replace(
+                    train.fix, variance_m2=math.inf, speed_variance_m2ps2=math.inf, reason=reason
+                )
             if math.isfinite(reading.variance_m2):
                 return train.fix
         if not train.entered:

@@ -330,7 +330,7 @@ def sweep(
     _choice("WHAT", what, ("link_margin",))
     if out.exists() and not out.is_dir():
         raise UsageError(f"--out: {out}: is not a directory")
-    _check_writable("--out", out / "any")
+    _check_writable("--out", (out if out.is_dir() else out.parent) / "any")
 
     from rich.console import Console
 

@@ -22,11 +22,11 @@ LENGTH_M = 100.0
 class Corridor:
     """Two trains on a track of 3 km, the first ahead; base station b1 alone is heard."""
 
-    def __init__(self) -> None:
+    def __init__(self, placed_m: float = 1.0) -> None:
         starts_m = {1: 1000.0, 2: 600.0}
         block = MovingBlock(
             [Segment(0, "main", 3000.0, ((0.0, 20.0),))],
-            [TrainStart(n, f"t{n}", LENGTH_M, 1, 0, m, 1.0) for n, m in starts_m.items()],
+            [TrainStart(n, f"t{n}", LENGTH_M, 1, 0, m, placed_m) for n, m in starts_m.items()],
         )
         draw = np.random.default_rng(7).bytes
         channels = {
@@ -35,7 +35,7 @@ class Corridor:
         self.desk = AuthorityDesk(block, channels, ["b1", "b2"])
         self.trains = {
             n: TrainProtection(
-                TrainIdentity(n, 0, start_m, 1.0, LENGTH_M),
+                TrainIdentity(n, 0, start_m, placed_m, LENGTH_M),
                 SafeChannel(SECRET, n, CONTROLLER, (Kind.MOVEMENT_AUTHORITY,), draw),
                 TrainLocation(0.02),
                 AuthoritySupervision(LENGTH_M),
@@ -117,12 +117,24 @@ def test_frames_of_others_do_nothing() -> None:
     corridor.desk.receive("b1", 99, bytes(64), 0)  # no such slot
 
 
+def test_a_range_that_contradicts_the_reports_is_not_told() -> None:
+    corridor = Corridor(placed_m=5.0)
+    for _ in range(8):
+        corridor.step()
+    before = corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[:2]
+    for _ in range(4):
+        corridor.desk.ranged(1, corridor.tick * 0.25, 0, 1300.0, 0.01**2)
+        corridor.step()
+    assert corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[:2] == before
+    assert "report and range disagree" in corridor.desk.troubles(1)
+
+
 def test_a_fix_moves_the_location() -> None:
-    corridor = Corridor()
+    corridor = Corridor(placed_m=5.0)
     for _ in range(4):
         corridor.step()
     corridor.desk.ranged(1, 1.0, 0, 1000.4, 0.01**2)
     for _ in range(2):
         corridor.step()
     front_m, half_m = corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[:2]
-    assert abs(front_m - 1000.4) <= half_m < 1.0
+    assert abs(front_m - 1000.4) <= half_m < 2.0

@@ -20,6 +20,8 @@ from rail_msgs_py.train_report import LocationReport
 from rail_wayside.moving_block import Authority, MovingBlock, to_telegram
 from rail_wayside.train_bounds import Trouble
 
+#: By so much another train's signal, 30 dB below, moves a range without being noticed [m].
+_UNSEEN_M = 1.5
 #: A frame that came through two base stations is no attack.
 _HARMLESS = Reason.REPEATED
 
@@ -112,7 +114,7 @@ class AuthorityDesk:
         caller = self._callers[number]
         if not (isfinite(position_m) and isfinite(variance_m2)):
             return
-        sigma_m = sqrt(variance_m2)
+        sigma_m = sqrt(variance_m2) + _UNSEEN_M / self._sigmas
         taken = self._block.ranged(number, time_s, segment, position_m, sigma_m)
         # A range that contradicts what the train reports is nothing to tell it.
         doubtful = {Trouble.RANGE, Trouble.RANGE_SEGMENT, Trouble.LEAP}

@@ -35,7 +35,8 @@ def test_dead_station(rail: Rail) -> None:
     (lost_s,) = told(report, controller, "lost past the end of zone3: wrs4 does not answer")
     assert 8.0 < beyond_s < lost_s < 20.0
     ranging = report["trains"]["train_a"]["phase_ranging"]
-    assert 0.95 < ranging["availability"] < 1.0
+    # ... and 1.5 s more, until it is confirmed.
+    assert 0.93 < ranging["availability"] < 1.0
     # The train behind comes to the station after it is back.
     assert report["trains"]["train_b"]["phase_ranging"]["availability"] == 1.0
 
@@ -58,7 +59,7 @@ def test_two_trains_in_one_zone(rail: Rail) -> None:
     assert misleading(report) == 0
     (shared_s,) = told(report, "/wayside/wrs3: zone3", "more than one signal in the zone")
     for train in ("train_a", "train_b"):
-        assert told(report, f"/wayside/zone_controller: {train}", "zone3") == [shared_s]
+        assert told(report, f"/wayside/zone_controller: {train}", "zone3 disturbed") == [shared_s]
         # Not known while both are in it, known before and, by name, after.
         assert 0.4 < report["trains"][train]["phase_ranging"]["availability"] < 0.8
         assert report["trains"][train]["handovers"]["missed"] == 0

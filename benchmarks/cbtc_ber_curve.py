@@ -23,10 +23,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rail_signals.diversity_error_rate import SCHEMES, Scheme, error_rate
+from rail_signals.diversity_error_rate import SCHEMES, error_rate
 from rail_signals.diversity_link import DiversityLink
 from rail_signals.diversity_monte_carlo import until
 from rail_signals.diversity_stale_channel import jakes_correlation, stale_error_rate
+from rail_signals.space_time_block import Scheme
 
 CONFIDENCE = 0.999
 ERRORS = 400

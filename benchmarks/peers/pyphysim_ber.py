@@ -4,7 +4,7 @@ Runs under an interpreter that has pyphysim, as a child of ``cbtc_ber.py``::
 
     python pyphysim_ber.py SCHEME EB_N0_DB BITS REPEATS SEED
 
-SCHEME is ``siso``, ``mrc_1x2``, ``alamouti_2x1`` or ``alamouti_2x2``. Prints one JSON object:
+SCHEME is ``siso``, ``mrc``, ``alamouti_2x1`` or ``alamouti_2x2``. Prints one JSON object:
 CPU seconds of each pass, all threads together, bits of a pass, errors of all passes, and the
 bits that share a channel.
 
@@ -26,7 +26,7 @@ from pyphysim.mimo.mimo import Alamouti
 from pyphysim.modulators import QPSK
 from pyphysim.util.misc import count_bit_errors, randn_c
 
-SIZES = {"siso": (1, 1), "mrc_1x2": (1, 2), "alamouti_2x1": (2, 1), "alamouti_2x2": (2, 2)}
+SIZES = {"siso": (1, 1), "mrc": (1, 2), "alamouti_2x1": (2, 1), "alamouti_2x2": (2, 2)}
 FRAME = 32
 BLOCKS = 4096
 

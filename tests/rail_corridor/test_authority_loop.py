@@ -96,11 +96,11 @@ def test_counts_tell_what_was_lost() -> None:
     corridor = Corridor()
     for _ in range(8):
         corridor.step()
-    before = corridor.trains[2].lost
+    before = corridor.trains[2].counts[1]
     for _ in range(3):
         corridor.step(deaf=(2,))
     corridor.step()
-    assert corridor.trains[2].lost == before + 3
+    assert corridor.trains[2].counts[1] == before + 3
     given = corridor.desk.given(2, corridor.tick * TICK_NS)
     assert given.lost == 0 and given.accepted > 5 and given.rejected == 0
 
@@ -110,10 +110,10 @@ def test_frames_of_others_do_nothing() -> None:
     for _ in range(8):
         corridor.step()
     for_first = corridor.down[1]
-    accepted = corridor.trains[2].accepted
+    accepted = corridor.trains[2].counts[0]
     corridor.trains[2].tick(corridor.tick * TICK_NS, 0.0, 0.0, for_first)
-    assert corridor.trains[2].accepted == accepted
-    assert corridor.trains[2].rejected == len(for_first)
+    assert corridor.trains[2].counts[0] == accepted
+    assert corridor.trains[2].counts[2] == len(for_first)
     corridor.desk.receive("b1", 99, bytes(64), 0)  # no such slot
 
 

@@ -13,7 +13,6 @@ from rail_signals.diversity_error_rate import (
     MRC_1X2,
     SCHEMES,
     SISO,
-    Scheme,
     awgn_error_rate,
     block_fading_frame_loss,
     conditional_error_rate,
@@ -25,6 +24,7 @@ from rail_signals.diversity_error_rate import (
     rician_error_rate,
 )
 from rail_signals.diversity_stale_channel import jakes_correlation, stale_error_rate
+from rail_signals.space_time_block import Scheme
 
 LEVELS = 10 ** (np.arange(0, 21, 5) / 10)
 ALL = pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
@@ -74,8 +74,8 @@ def test_a_strong_constant_part_leaves_noise_only(scheme: Scheme) -> None:
 @ALL
 @pytest.mark.parametrize("bits", [1, 4])
 def test_rayleigh_is_the_mean_over_gamma_distributed_gain(scheme: Scheme, bits: int) -> None:
-    gain = np.random.default_rng(3).gamma(scheme.branches, size=200_000)
-    sample = conditional_error_rate(10 / scheme.transmitters * gain, bits)
+    gain = np.random.default_rng(3).gamma(scheme.diversity, size=200_000)
+    sample = conditional_error_rate(10 / scheme.transmit * gain, bits)
     assert sample.mean() == pytest.approx(
         float(error_rate(scheme, 10.0, bits)), abs=5 * sample.std() / math.sqrt(gain.size)
     )

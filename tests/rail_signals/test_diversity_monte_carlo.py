@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rail_signals.diversity_error_rate import ALAMOUTI_2X2, SCHEMES, SISO, Scheme, error_rate
+from rail_signals.diversity_error_rate import ALAMOUTI_2X2, SCHEMES, SISO, error_rate
 from rail_signals.diversity_link import DiversityLink
 from rail_signals.diversity_monte_carlo import Result, clopper_pearson, until
 from rail_signals.diversity_plain import PlainLink
 from rail_signals.diversity_stale_channel import stale_error_rate
+from rail_signals.space_time_block import Scheme
 
 ALL = pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
 BITS = pytest.mark.parametrize("bits", [1, 2], ids=["bpsk", "qpsk"])
@@ -45,7 +46,7 @@ def test_decisions_are_those_of_the_equations(
 def naive(scheme: Scheme, sent: np.ndarray, channel: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """Eqs 1-8 in complex128, one code block after the other's shapes; returns [symbol, block]."""
     x = 1.0 - 2.0 * sent[:, 0] + (1j * (1.0 - 2.0 * sent[:, 1]) if sent.shape[1] == 2 else 0)
-    if scheme.transmitters == 2:
+    if scheme.transmit == 2:
         x = x.astype(np.complex128)
         code = np.array([[x[0], -x[1].conj()], [x[1], x[0].conj()]])
     else:
@@ -53,7 +54,7 @@ def naive(scheme: Scheme, sent: np.ndarray, channel: np.ndarray, noise: np.ndarr
     # code [transmitter, time, block]; channel [time, receiver, transmitter, block]
     heard = np.einsum("trmb,mtb->rtb", channel, code) + noise
     h = channel[0]
-    if scheme.transmitters == 1:
+    if scheme.transmit == 1:
         return np.einsum("rb,rtb->tb", h[:, 0].conj(), heard)
     y1, y2 = heard[:, 0], heard[:, 1].conj()
     first = h[:, 0].conj() * y1 + h[:, 1] * y2

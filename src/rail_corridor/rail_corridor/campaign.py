@@ -8,10 +8,6 @@ goes to a wrong channel, and no position that is claimed to be known is false.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -21,12 +17,9 @@ from rich.console import Console
 from rich.table import Table
 
 from .campaign_scenarios import MOST_TRAINS, Situation, scenario_data
+from .child_run import RunFailedError, faultless_report_of
 
 _RUN_TIMEOUT_S = 1800.0
-
-
-class RunFailedError(RuntimeError):
-    """A run of the campaign did not come to its report."""
 
 
 @dataclass
@@ -97,7 +90,9 @@ def run_campaign(
             else:
                 trains = min(trains, crossings // 15 + 1)
             made = row.crossings
-            row.add(_run(scenario_data(situation, trains, seed + row.runs)))
+            data = scenario_data(situation, trains, seed + row.runs)
+            label = f"{data['name']}, seed {data['seed']}"
+            row.add(faultless_report_of(data, label, timeout_s=_RUN_TIMEOUT_S))
             console.print(
                 f"{situation.name}: {row.crossings} crossings in {row.runs} runs, "
                 f"{row.violations} violations",
@@ -106,27 +101,6 @@ def run_campaign(
             if row.crossings == made:
                 raise RunFailedError(f"{situation.name}: no train crossed a station")
         yield row
-
-
-def _run(data: dict[str, Any]) -> dict[str, Any]:
-    """Report of one scenario."""
-    with tempfile.TemporaryDirectory(prefix="rail_campaign_") as directory:
-        scenario = Path(directory) / f"{data['name']}.yaml"
-        report = Path(directory) / "report.json"
-        scenario.write_text(json.dumps(data))
-        command = [sys.executable, "-m", "rail_corridor.cli", "run", str(scenario)]
-        command += ["--processes", "one", "--report", str(report)]
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=_RUN_TIMEOUT_S, env=os.environ
-        )
-        if done.returncode or not report.is_file():
-            last = (done.stderr.strip() or done.stdout.strip()).splitlines()[-1:]
-            raise RunFailedError(f"{data['name']}, seed {data['seed']}: {' '.join(last)}")
-        found: dict[str, Any] = json.loads(report.read_text())
-        for failed in found["failures"]:
-            name = f"{data['name']}, seed {data['seed']}"
-            raise RunFailedError(f"{name}: {failed['node']}: {failed['reason']}")
-        return found
 
 
 def print_rows(rows: Iterable[Row], console: Console) -> None:

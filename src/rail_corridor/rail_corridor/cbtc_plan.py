@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import math
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from rail_msgs_py.safe_frame import FRAME_BYTES
@@ -195,9 +195,8 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
 
 def steepest_fall_permil(track: Track) -> float:
     """Steepest fall towards increasing chainage, 0 or more [permil]."""
-    places_m = [0.0]
-    places_m += [k * 1.0 for k in range(1, math.ceil(track.length_m))]
-    return max(0.0, -float(track.gradient_permil(places_m).min()))
+    steps = track.gradients_permil.part(0.0, track.length_m)
+    return max(0.0, *(-gradient for _, gradient in steps))
 
 
 def controller_parameters(scenario: Scenario) -> dict[str, Any]:
@@ -238,10 +237,5 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
 
 def limit_steps(track: Track) -> list[tuple[float, float]]:
     """Speed limits of a track [m, m/s], from 0 on."""
-    places_m = [float(k) for k in range(math.ceil(track.length_m))]
-    limits = track.limit_mps(places_m).tolist()
-    steps = [(0.0, limits[0])]
-    for place_m, limit_mps in zip(places_m, limits, strict=True):
-        if limit_mps != steps[-1][1]:
-            steps.append((place_m, limit_mps))
-    return steps
+    steps = track.limits_mps.part(0.0, track.length_m)
+    return [steps[0], *(after for before, after in pairwise(steps) if after[1] != before[1])]

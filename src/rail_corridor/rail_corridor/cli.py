@@ -291,8 +291,9 @@ def campaign(
 
     from rich.console import Console
 
-    from .campaign import Row, RunFailedError, print_rows, run_campaign, write_rows
+    from .campaign import Row, print_rows, run_campaign, write_rows
     from .campaign_scenarios import situations
+    from .child_run import RunFailedError
 
     console = Console()
     if what == "kills":
@@ -334,7 +335,7 @@ def sweep(
 
     from rich.console import Console
 
-    from .campaign import RunFailedError
+    from .child_run import RunFailedError
     from .link_margin import run_link_margin
 
     try:

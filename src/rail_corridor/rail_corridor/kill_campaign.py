@@ -9,10 +9,7 @@ a wrong place or an authority that nobody gave. What stops the trains is counted
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -21,7 +18,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from .campaign import RunFailedError
+from .child_run import RunFailedError, report_of
 from .kill_scenarios import DURATION_S, TICK_S, KillCase, draw_case
 
 #: Wall time after which a silent node is given up [s], a share of it for each: long, as on a busy
@@ -175,21 +172,10 @@ def run_case(case: KillCase) -> KillRow:
     RunFailedError
         If it did not come to its report.
     """
-    with tempfile.TemporaryDirectory(prefix="rail_campaign_") as directory:
-        scenario = Path(directory) / "scenario.yaml"
-        report = Path(directory) / "report.json"
-        scenario.write_text(json.dumps(case.data))
-        command = [sys.executable, "-m", "rail_corridor.cli", "run", str(scenario)]
-        command += ["--processes", "one", "--report", str(report), "--timeout", str(_SILENCE_S)]
-        command += ["--kill", f"{case.kill.node}@{case.kill.time_s}"]
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=_RUN_TIMEOUT_S, env=os.environ
-        )
-        if done.returncode or not report.is_file():
-            last = (done.stderr.strip() or done.stdout.strip()).splitlines()[-1:]
-            what = f"seed {case.seed}, {case.kill.node} at {case.kill.time_s} s"
-            raise RunFailedError(f"{what}: exit code {done.returncode}: {' '.join(last)}")
-        return row_of(case, json.loads(report.read_text()))
+    label = f"seed {case.seed}, {case.kill.node} at {case.kill.time_s} s"
+    arguments = ["--timeout", str(_SILENCE_S), "--kill", f"{case.kill.node}@{case.kill.time_s}"]
+    report = report_of(case.data, label, timeout_s=_RUN_TIMEOUT_S, arguments=arguments)
+    return row_of(case, report)
 
 
 def print_kill_rows(rows: Iterable[KillRow], console: Console) -> None:

@@ -11,12 +11,9 @@ in a fade would never receive its first authority.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import subprocess
-import sys
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -28,8 +25,8 @@ from typing import Any, Final
 from rich.console import Console
 from scipy.stats import chi2
 
-from .campaign import RunFailedError
 from .cbtc_metrics import PASSED_AT
+from .child_run import RunFailedError, faultless_report_of
 from .link_margin_theory import Prediction, predict
 from .scenario import Scenario
 
@@ -251,7 +248,10 @@ def run_link_margin(out_dir: Path, quick: bool, console: Console) -> list[Row]:
         domain = domains.get()
         try:
             data = scenario_data(point)
-            row = aggregate(point, _run(data, domain), predict(Scenario.model_validate(data)))
+            report = faultless_report_of(
+                data, data["name"], timeout_s=_RUN_TIMEOUT_S, domain=domain
+            )
+            row = aggregate(point, report, predict(Scenario.model_validate(data)))
         except (RunFailedError, subprocess.TimeoutExpired) as error:
             failed.append(str(error))
             return None
@@ -270,24 +270,3 @@ def run_link_margin(out_dir: Path, quick: bool, console: Console) -> list[Row]:
     if failed:
         raise RunFailedError("; ".join(failed))
     return rows
-
-
-def _run(data: dict[str, Any], domain: int) -> dict[str, Any]:
-    """Report of one scenario, run in a ROS domain."""
-    with tempfile.TemporaryDirectory(prefix="rail_link_margin_") as directory:
-        scenario = Path(directory) / f"{data['name']}.yaml"
-        report = Path(directory) / "report.json"
-        scenario.write_text(json.dumps(data))
-        command = [sys.executable, "-m", "rail_corridor.cli", "run", str(scenario)]
-        command += ["--processes", "one", "--report", str(report)]
-        environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=_RUN_TIMEOUT_S, env=environment
-        )
-        if done.returncode or not report.is_file():
-            last = (done.stderr.strip() or done.stdout.strip()).splitlines()[-1:]
-            raise RunFailedError(f"{data['name']}: {' '.join(last)}")
-        found: dict[str, Any] = json.loads(report.read_text())
-        for failed in found["failures"]:
-            raise RunFailedError(f"{data['name']}: {failed['node']}: {failed['reason']}")
-        return found

@@ -26,17 +26,14 @@ from scipy.special import j0
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.diversity_error_rate import (
-    ALAMOUTI_2X1,
-    ALAMOUTI_2X2,
-    MRC_1X2,
-    SISO,
-    Scheme,
     block_fading_frame_loss,
     conditional_error_rate,
     mean_messages_until_losses,
 )
 from rail_signals.pilot_estimation import wiener_estimator
 from rail_signals.radio_burst import RadioBurstFormat
+from rail_signals.space_time_block import Scheme
+from rail_signals.space_time_block import scheme as by_name
 from rail_world.cbtc_links import COLUMNS
 from rail_world.cbtc_medium import CbtcMedium
 
@@ -45,12 +42,6 @@ from .scenario import Scenario
 
 FloatArray = NDArray[np.float64]
 
-ANTENNAS: Final = {
-    "siso": SISO,
-    "mrc": MRC_1X2,
-    "alamouti_2x1": ALAMOUTI_2X1,
-    "alamouti_2x2": ALAMOUTI_2X2,
-}
 SPEED_MPS: Final = 80.0 / 3.6
 _BITS_PER_SYMBOL = 2
 _INSTANTS = 24
@@ -92,7 +83,7 @@ def theory(
     """
     running = _running(scheme, levels_db, burst)
     eb_n0 = 10.0 ** (_effective_db(levels_db, burst) / 10.0) / _BITS_PER_SYMBOL
-    at_rest = block_fading_frame_loss(ANTENNAS[scheme], eb_n0, burst.data_bits)
+    at_rest = block_fading_frame_loss(by_name(scheme), eb_n0, burst.data_bits)
     return Prediction(
         float(np.median(levels_db)),
         float(at_rest.mean()),
@@ -139,12 +130,12 @@ def line_es_n0_db(scenario: Scenario, from_share: float, step_m: float = 10.0) -
 @lru_cache(maxsize=16)
 def running_loss(scheme: str, burst: RadioBurstFormat, carrier_hz: float = 2.4e9) -> FloatArray:
     """Loss of a frame at full speed for the levels of a grid."""
-    antennas = ANTENNAS[scheme]
+    antennas = by_name(scheme)
     gains = fading_energy(antennas, burst, carrier_hz)
     bits = burst.data_bits / _INSTANTS
     eb_n0 = 10.0 ** (_effective_db(_GRID_DB, burst) / 10.0) / _BITS_PER_SYMBOL
     loss = np.empty(len(_GRID_DB))
-    for index, level in enumerate(eb_n0 / antennas.transmitters):
+    for index, level in enumerate(eb_n0 / antennas.transmit):
         p = conditional_error_rate(level * gains, _BITS_PER_SYMBOL)
         loss[index] = -np.expm1(bits * np.log1p(-p).sum(axis=1)).mean()
     return np.maximum(loss, _LEAST_LOSS)
@@ -152,13 +143,13 @@ def running_loss(scheme: str, burst: RadioBurstFormat, carrier_hz: float = 2.4e9
 
 def fading_energy(scheme: Scheme, burst: RadioBurstFormat, carrier_hz: float) -> FloatArray:
     """Sum of the branches' power gains at instants through drawn frames [draw, instant]."""
-    rng = np.random.default_rng([burst.data_bits, scheme.branches])
+    rng = np.random.default_rng([burst.data_bits, scheme.diversity])
     time_s = np.linspace(0.0, burst.pattern.symbols / burst.symbol_rate_hz, _INSTANTS)
     doppler_hz = SPEED_MPS * carrier_hz / SPEED_OF_LIGHT_M_PER_S
     covariance = j0(2.0 * math.pi * doppler_hz * (time_s[:, None] - time_s))
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0) / 2.0)
-    parts = rng.standard_normal((_DRAWS, 2 * scheme.branches, _INSTANTS)) @ root.T
+    parts = rng.standard_normal((_DRAWS, 2 * scheme.diversity, _INSTANTS)) @ root.T
     return np.asarray((parts**2).sum(axis=1))
 
 

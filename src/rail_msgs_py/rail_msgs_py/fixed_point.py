@@ -39,6 +39,22 @@ def nearest(value: float, per_unit: int) -> int:
     return round(value * per_unit)
 
 
+def covering(
+    middle: float, half: float, middle_per_unit: int, half_per_unit: int
+) -> tuple[int, int]:
+    """Counts of an interval's middle, to the nearest, and half-width, so that it covers the old.
+
+    >>> covering(1234.567, 3.0, 100, 10)
+    (123457, 31)
+    """
+    count = nearest(middle, middle_per_unit)
+    shift = abs(middle - count / middle_per_unit)
+    if shift:
+        # The sum itself is rounded: the next double is surely not below it.
+        half = math.nextafter(half + shift, math.inf)
+    return count, up(half, half_per_unit)
+
+
 def check_number(name: str, value: float, low: float, high: float) -> None:
     """Refuse a number that is not from `low` to `high`.
 

@@ -26,7 +26,6 @@ limit begins earlier, one to a higher limit later. The half-width covers the rou
 
 from __future__ import annotations
 
-import math
 import struct
 from dataclasses import dataclass
 from typing import Final
@@ -35,8 +34,8 @@ from rail_msgs_py.fixed_point import (
     check_direction,
     check_identity,
     check_number,
+    covering,
     down,
-    nearest,
     up,
 )
 
@@ -47,6 +46,7 @@ MOST_STEPS: Final = 2
 WIDEST_M: Final = 6553.5
 
 PER_METRE: Final = 100
+PER_METRE_COARSE: Final = 10
 PER_MPS: Final = 100
 PER_SECOND: Final = 100
 
@@ -175,10 +175,7 @@ class MovementAuthority:
     def _located_on_the_wire(self) -> tuple[int, int] | None:
         if self.located is None:
             return None
-        place_m, half_m = self.located
-        place = nearest(place_m, PER_METRE)
-        shift_m = abs(place_m - place / PER_METRE)
-        half = up(math.nextafter(half_m + shift_m, math.inf) if shift_m else half_m, 10)
+        place, half = covering(*self.located, PER_METRE, PER_METRE_COARSE)
         return (place, half) if half <= 0xFFFF else None
 
     def _steps_on_the_wire(self) -> list[tuple[int, int]]:
@@ -233,4 +230,4 @@ class MovementAuthority:
 
 def _located_of(raw: bytes) -> tuple[float, float]:
     place, half = _LOCATED.unpack_from(raw, _LOCATED_AT)
-    return place / PER_METRE, half / 10
+    return place / PER_METRE, half / PER_METRE_COARSE

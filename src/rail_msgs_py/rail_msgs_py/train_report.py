@@ -25,12 +25,17 @@ not be used to move it on.)
 
 from __future__ import annotations
 
-import math
 import struct
 from dataclasses import dataclass
 from typing import Final
 
-from rail_msgs_py.fixed_point import check_direction, check_identity, check_number, nearest, up
+from rail_msgs_py.fixed_point import (
+    check_direction,
+    check_identity,
+    check_number,
+    covering,
+    up,
+)
 
 FURTHEST_M: Final = 1e6
 FASTEST_MPS: Final = 200.0
@@ -118,13 +123,9 @@ class LocationReport:
 
     def to_bytes(self) -> bytes:
         """Bytes on the wire."""
-        offset = nearest(self.offset_m, PER_METRE)
-        shift_m = abs(self.offset_m - offset / PER_METRE)
-        covered_m = self.uncertainty_m
-        if shift_m:
-            # The sum itself is rounded: the next double is surely not below it.
-            covered_m = math.nextafter(covered_m + shift_m, math.inf)
-        uncertainty = up(covered_m, PER_METRE_COARSE)
+        offset, uncertainty = covering(
+            self.offset_m, self.uncertainty_m, PER_METRE, PER_METRE_COARSE
+        )
         valid = self.position_valid and uncertainty <= _MOST
         return _LAYOUT.pack(
             self.train,

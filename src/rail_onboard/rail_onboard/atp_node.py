@@ -18,11 +18,10 @@ from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import Equipment
 from rail_msgs_py.parameters import ParameterError, declare, parameter
-from rail_msgs_py.safe_channel import SafeChannel
-from rail_msgs_py.safe_frame import Kind
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter, figures_from_cdr
 from rail_msgs_py.telegrams import Telegrams, telegrams
+from rail_msgs_py.train_channel import train_end
 from rail_onboard.authority_supervision import AuthoritySupervision
 from rail_onboard.braking_curve import GuaranteedBraking
 from rail_onboard.code_supervision import SupervisionOutput, Thresholds
@@ -30,9 +29,6 @@ from rail_onboard.train_location import TrainLocation
 from rail_onboard.train_protection import TrainIdentity, TrainProtection
 
 _ODOMETER, _RADIO = "odometer", "radio"
-CONTROLLER_IDENTITY = 0xF000
-"""Of the zone controller in the safe channel; trains have their numbers."""
-_NONCE_STREAM = 5
 _OFF = SupervisionOutput(0.0, True, True, True, "switched off")
 
 
@@ -85,7 +81,6 @@ def protection_of(p: AtpParameters) -> TrainProtection:
     # A speed measured in one tick is acted on in the next: two ticks, and a tenth for the brake.
     delay_s = 2.0 * p.tick_s + 0.1
     try:
-        secret = bytes.fromhex(p.secret)
         braking = GuaranteedBraking(
             service_mps2=p.braking_mps2,
             emergency_mps2=p.emergency_mps2,
@@ -104,15 +99,7 @@ def protection_of(p: AtpParameters) -> TrainProtection:
             braking=braking,
             thresholds=thresholds,
         )
-        bits = np.random.Philox(np.random.SeedSequence([p.seed, _NONCE_STREAM, p.number]))
-        channel = SafeChannel(
-            secret,
-            p.number,
-            CONTROLLER_IDENTITY,
-            (Kind.MOVEMENT_AUTHORITY,),
-            np.random.Generator(bits).bytes,
-            max_age_s=max(1.0, 3.0 * p.tick_s),
-        )
+        channel = train_end(p.secret, p.seed, p.number, p.tick_s)
     except ValueError as error:
         raise ParameterError(f"atp: {error}") from None
     identity = TrainIdentity(p.number, p.segment, p.start_m, p.placed_m, p.length_m)

@@ -9,8 +9,8 @@ from math import inf, nan
 from rail_msgs_py.movement_authority import MovementAuthority
 from rail_msgs_py.safe_channel import SafeChannel
 from rail_msgs_py.safe_frame import Kind
-from rail_msgs_py.safe_result import Accepted, Reason, Rejected
 from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.train_channel import CountedChannel
 from rail_msgs_py.train_report import FASTEST_MPS, WIDEST_M, LocationReport
 from rail_onboard.authority_supervision import Authority, AuthoritySupervision
 from rail_onboard.code_supervision import SupervisionOutput
@@ -52,10 +52,14 @@ class TrainProtection:
         location: TrainLocation,
         supervision: AuthoritySupervision,
     ) -> None:
-        self._identity, self._channel = identity, channel
+        self._identity, self._channel = identity, CountedChannel(channel)
         self._location, self._supervision = location, supervision
         self._placed = False
-        self.accepted = self.lost = self.rejected = 0
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Frames accepted, lost and rejected."""
+        return self._channel.counts
 
     def tick(
         self, time_ns: int, distance_m: float, speed_mps: float, frames: Iterable[bytes]
@@ -75,27 +79,18 @@ class TrainProtection:
         return self._supervision.update(time_s, here, speed_mps, authority=newest)
 
     def _read(self, frame: bytes, time_ns: int) -> Authority | None:
-        opened = self._channel.open(frame, time_ns)
-        if isinstance(opened, Rejected):
-            # What came through two base stations is no attack.
-            self.rejected += opened.reason is not Reason.REPEATED
+        _, opened = self._channel.open(frame, time_ns)
+        if opened is None:
             return None
-        if not isinstance(opened, Accepted):
-            return None
-        self.accepted += 1
-        self.lost += opened.lost
         train = self._identity
         try:
             told = MovementAuthority.from_bytes(opened.payload)
         except ValueError:
-            self.rejected += 1
+            self._channel.refuse()
             return None
-        if (told.train, told.segment, told.direction) != (
-            train.number,
-            train.segment,
-            train.direction,
-        ):
-            self.rejected += 1
+        mine = (train.number, train.segment, train.direction)
+        if (told.train, told.segment, told.direction) != mine:
+            self._channel.refuse()
             return None
         sealed_s = time_ns / NANOSECONDS - opened.age_s
         if told.located is not None:
@@ -125,7 +120,7 @@ class TrainProtection:
             True,
             valid,
         )
-        return self._channel.seal(Kind.LOCATION_REPORT, report.to_bytes(), time_ns)
+        return self._channel.channel.seal(Kind.LOCATION_REPORT, report.to_bytes(), time_ns)
 
     def figures(self, time_ns: int) -> tuple[float, ...]:
         """Figures as ``rail_msgs_py.topics.ATP_COLUMNS``; NaN where there is none."""
@@ -137,7 +132,5 @@ class TrainProtection:
             here.uncertainty_m if here.valid else inf,
             nan if held is None else held.end_m,
             inf if held is None else time_s - held.sealed_s,
-            self.accepted,
-            self.lost,
-            self.rejected,
+            *self.counts,
         )

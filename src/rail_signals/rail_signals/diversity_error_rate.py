@@ -20,7 +20,6 @@ QPSK and 16-QAM are Gray coded; the error rate is the mean over the bits of a sy
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -29,37 +28,13 @@ from scipy.optimize import brentq
 from scipy.special import gammaln, ndtr
 
 from rail_signals.ranging_signal import FloatArray
+from rail_signals.space_time_block import Scheme
+from rail_signals.space_time_block import scheme as by_name
 
-
-@dataclass(frozen=True)
-class Scheme:
-    """Antennas of a link; two transmitters use the code of Alamouti.
-
-    Raises
-    ------
-    ValueError
-        If either end has other than one or two antennas.
-    """
-
-    name: str
-    transmitters: int
-    receivers: int
-
-    def __post_init__(self) -> None:
-        for count in (self.transmitters, self.receivers):
-            if count not in (1, 2):
-                raise ValueError(f"either end has 1 or 2 antennas, got {count!r}")
-
-    @property
-    def branches(self) -> int:
-        """Order of diversity."""
-        return self.transmitters * self.receivers
-
-
-SISO: Final = Scheme("siso", 1, 1)
-MRC_1X2: Final = Scheme("mrc_1x2", 1, 2)
-ALAMOUTI_2X1: Final = Scheme("alamouti_2x1", 2, 1)
-ALAMOUTI_2X2: Final = Scheme("alamouti_2x2", 2, 2)
+SISO: Final = by_name("siso")
+MRC_1X2: Final = by_name("mrc")
+ALAMOUTI_2X1: Final = by_name("alamouti_2x1")
+ALAMOUTI_2X2: Final = by_name("alamouti_2x2")
 SCHEMES: Final = {s.name: s for s in (SISO, MRC_1X2, ALAMOUTI_2X1, ALAMOUTI_2X2)}
 
 _ONE: Final = ((1.0, 1.0),)
@@ -86,8 +61,8 @@ def error_rate(scheme: Scheme, eb_n0: ArrayLike, bits_per_symbol: int = 2) -> Fl
     >>> [f"{error_rate(s, 10.0):.2e}" for s in (MRC_1X2, ALAMOUTI_2X2)]
     ['1.60e-03', '1.13e-04']
     """
-    gamma = _ratio(eb_n0) / scheme.transmitters
-    order = scheme.branches
+    gamma = _ratio(eb_n0) / scheme.transmit
+    order = scheme.diversity
     total = np.zeros_like(gamma)
     for weight, c in _terms(bits_per_symbol):
         x = c * gamma
@@ -121,19 +96,19 @@ def rician_error_rate(
         raise ValueError(f"k_factor must not be negative, got {k_factor!r}")
     if math.isinf(k_factor):
         return awgn_error_rate(scheme, eb_n0, bits_per_symbol)
-    gamma = _ratio(eb_n0)[..., None] / scheme.transmitters
+    gamma = _ratio(eb_n0)[..., None] / scheme.transmit
     sine2 = np.sin((np.arange(512) + 0.5) * (math.pi / 1024)) ** 2
     total = np.zeros(gamma.shape[:-1])
     for weight, c in _terms(bits_per_symbol):
         x = c * gamma / sine2
         log_mgf = np.log1p(k_factor) - np.log(1 + k_factor + x) - k_factor * x / (1 + k_factor + x)
-        total += weight / 2 * np.exp(scheme.branches * log_mgf).mean(axis=-1)
+        total += weight / 2 * np.exp(scheme.diversity * log_mgf).mean(axis=-1)
     return total
 
 
 def awgn_error_rate(scheme: Scheme, eb_n0: ArrayLike, bits_per_symbol: int = 2) -> FloatArray:
     """Bit error rate without fading: every branch has unit gain."""
-    return conditional_error_rate(_ratio(eb_n0) * scheme.receivers, bits_per_symbol)
+    return conditional_error_rate(_ratio(eb_n0) * scheme.receive, bits_per_symbol)
 
 
 def conditional_error_rate(snr: ArrayLike, bits_per_symbol: int = 2) -> FloatArray:
@@ -195,10 +170,10 @@ def block_fading_frame_loss(
     if bits < 1:
         raise ValueError(f"bits must be at least 1, got {bits!r}")
     # In t = log g all is smooth and falls off at both ends: a plain sum converges fast.
-    step, order = 0.01, scheme.branches
+    step, order = 0.01, scheme.diversity
     t = np.arange(-60.0 / order, 5.0, step)
     weight = np.exp(order * t - np.exp(t) - gammaln(order)) * step
-    gamma = _ratio(eb_n0)[..., None] / scheme.transmitters
+    gamma = _ratio(eb_n0)[..., None] / scheme.transmit
     loss = frame_loss(conditional_error_rate(gamma * np.exp(t), bits_per_symbol), bits)
     return np.asarray(loss @ weight)
 

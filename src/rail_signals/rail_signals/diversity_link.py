@@ -32,8 +32,8 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.random import BitGenerator
 from numpy.typing import NDArray
 
-from rail_signals.diversity_error_rate import Scheme
 from rail_signals.ranging_signal import ComplexArray
+from rail_signals.space_time_block import Scheme
 
 SingleArray: TypeAlias = NDArray[np.float32]
 
@@ -91,7 +91,7 @@ class DiversityLink:
         self.scheme = scheme
         self.bits_per_symbol = bits_per_symbol
         self.correlation = correlation
-        n, tx, rx, parts = code_blocks, scheme.transmitters, scheme.receivers, bits_per_symbol
+        n, tx, rx, parts = code_blocks, scheme.transmit, scheme.receive, bits_per_symbol
         self.bits_per_step = 2 * parts * n
         self._blocks = n
         self._moves = correlation < 1
@@ -165,7 +165,7 @@ class DiversityLink:
         np.multiply(radius[:links], self._link_powers, out=radius[:links])
         np.multiply(radius[links:], self._noise_power, out=radius[links:])
         np.sqrt(radius, out=radius)
-        tx, rx, n = self.scheme.transmitters, self.scheme.receivers, self._blocks
+        tx, rx, n = self.scheme.transmit, self.scheme.receive, self._blocks
         first = 0
         for rows in self._rows:
             some = slice(first, first + tx * rx)
@@ -192,7 +192,7 @@ class DiversityLink:
 
     def _complete(self, rows: SingleArray) -> None:
         """Rows of the window from (h1, h2): -h1, and j times h2, h1, -h2."""
-        alamouti = self.scheme.transmitters == 2
+        alamouti = self.scheme.transmit == 2
         if alamouti:
             np.negative(rows[:, 0, 0], out=rows[:, 0, 2])
         if self.bits_per_symbol == 2:
@@ -204,7 +204,7 @@ class DiversityLink:
 
     def _window(self, rows: SingleArray) -> SingleArray:
         """G as a view of its rows: [receiver, part of s, symbol, (time,) part of y, block]."""
-        if self.scheme.transmitters == 1:
+        if self.scheme.transmit == 1:
             return rows[:, :, 0]
         rx, parts, _, _, n = rows.shape
         r, q, slot, c, b = rows.strides
@@ -212,7 +212,7 @@ class DiversityLink:
 
     def _transmit(self) -> None:
         heard = self._heard
-        if self.scheme.transmitters == 1:
+        if self.scheme.transmit == 1:
             if self._moves:
                 for t, matrix in enumerate(self._matrices):
                     np.einsum("rqcn,qn->rcn", matrix, self._symbol[:, t], out=heard[:, t])
@@ -226,7 +226,7 @@ class DiversityLink:
         np.add(heard, self._noise, out=heard)
 
     def _combine(self) -> None:
-        form = "rqcn,rtcn->qtn" if self.scheme.transmitters == 1 else "rqmtcn,rtcn->qmn"
+        form = "rqcn,rtcn->qtn" if self.scheme.transmit == 1 else "rqmtcn,rtcn->qmn"
         np.einsum(form, self._matrices[0], self._heard, out=self._found)
 
     def _compare(self) -> tuple[int, int]:
@@ -250,7 +250,7 @@ class DiversityLink:
             ``channel`` complex [time, receiver, transmitter, block]; ``noise`` complex
             [receiver, time, block], its power the mean of ``N_t / eb_n0``.
         """
-        tx = self.scheme.transmitters
+        tx = self.scheme.transmit
         channels = [_complex(rows[:, 0, :tx]) for rows in self._rows]
         return {
             "sent": self._by_symbol(self._sent),
@@ -261,7 +261,7 @@ class DiversityLink:
 
     def _by_symbol(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         parts: NDArray[np.bool_] = rows.transpose(1, 0, 2).copy()
-        if self.scheme.transmitters == 2 and self.bits_per_symbol == 2:
+        if self.scheme.transmit == 2 and self.bits_per_symbol == 2:
             parts[:, 1] = parts[::-1, 1].copy()  # s ends with Im x2, Im x1
         return parts
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.random import BitGenerator, Generator
 from numpy.typing import NDArray
 
-from rail_signals.diversity_error_rate import Scheme
 from rail_signals.ranging_signal import ComplexArray, FloatArray
+from rail_signals.space_time_block import Scheme
 
 
 class PlainLink:
@@ -47,13 +47,13 @@ class PlainLink:
         self._blocks = code_blocks
         # Energy of a symbol with levels +-1 (and +-3) in each of its parts.
         energy = {1: 1.0, 2: 2.0, 4: 10.0}[bits_per_symbol]
-        noise = energy / bits_per_symbol * scheme.transmitters / eb_n0
+        noise = energy / bits_per_symbol * scheme.transmit / eb_n0
         self._sigma = math.sqrt(noise / 2)
 
     def step(self, generator: BitGenerator) -> tuple[int, int]:
         """Wrong bits, and the sum over code blocks of the square of their number."""
         rng = Generator(generator)
-        rx, tx, n = self.scheme.receivers, self.scheme.transmitters, self._blocks
+        rx, tx, n = self.scheme.receive, self.scheme.transmit, self._blocks
         bits = rng.integers(0, 2, (self.bits_per_symbol, 2, n), dtype=np.uint8)
         x1, x2 = self._modulate(bits)
         h = _normal(rng, tx, rx, n) * math.sqrt(0.5)

@@ -31,8 +31,8 @@ from numpy.typing import ArrayLike
 from scipy.special import j0
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.diversity_error_rate import Scheme
 from rail_signals.ranging_signal import ComplexArray, FloatArray
+from rail_signals.space_time_block import Scheme
 
 _NODES = 256
 
@@ -84,7 +84,7 @@ def stale_error_rate(
     others = [p * sign for p in points for sign in (1, -1)]
     flat = []
     for level in ratio.ravel().tolist():
-        noise = scheme.transmitters / level
+        noise = scheme.transmit / level
         rates = [
             _negative_probability(scheme, correlation, noise, x, other, second)
             for x, other, second in itertools.product(points, others, (False, True))
@@ -100,7 +100,7 @@ def _negative_probability(
     # Columns of `mix`: h1, h2 at t; innovations of both; noise of both symbols.
     fresh = math.sqrt(1 - rho**2)
     x1, x2 = (other, x) if second else (x, other)
-    if scheme.transmitters == 1:
+    if scheme.transmit == 1:
         heard = [[x1, 0, 0, 0, 1, 0], [rho * x2, 0, fresh * x2, 0, 0, 1]]
         pairs = [(0, 3)] if second else [(0, 2)]
         signs = [1.0]
@@ -115,7 +115,7 @@ def _negative_probability(
     form = np.zeros((4, 4), dtype=np.complex128)
     for (i, k), sign in zip(pairs, signs, strict=True):
         form[i, k] = form[k, i] = sign / 2
-    return _below_zero(mix.conj().T @ form @ mix, scheme.receivers)
+    return _below_zero(mix.conj().T @ form @ mix, scheme.receive)
 
 
 def _below_zero(form: ComplexArray, copies: int) -> float:

@@ -174,3 +174,20 @@ class MimoFading:
             field += np.take((waves * term[:, None, :]).sum(axis=-1), index, axis=1)
         shape = (self.receive, self.transmit, *place.shape)
         return np.ascontiguousarray(np.moveaxis(field.reshape(shape), (0, 1), (-3, -2)))
+
+    def at_few(self, distance_m: ArrayLike) -> ComplexArray:
+        """As `at`, wave by wave: quicker for places [n] far apart.
+
+        Less than a turn is left of each phase, so that single precision is good to 1e-6 of a
+        wave (-120 dB).
+
+        Returns
+        -------
+        complex128 [rx, tx, n]
+        """
+        cells = np.asarray(distance_m) * (_CELLS_PER_WAVELENGTH / self.wavelength_m)
+        turns = cells[:, None] * self._turns[:, None, :]
+        turns -= np.rint(turns)
+        angle = (2.0 * math.pi * turns).astype(np.float32)
+        field = (self._terms[0][:, None, :] * cis(angle)).sum(axis=-1)
+        return np.asarray(field.reshape(self.receive, self.transmit, -1))

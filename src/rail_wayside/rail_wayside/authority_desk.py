@@ -14,30 +14,25 @@ from typing import NamedTuple
 
 from rail_msgs_py.safe_channel import SafeChannel
 from rail_msgs_py.safe_frame import Kind
-from rail_msgs_py.safe_result import Accepted, Reason, Rejected
 from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.train_channel import CountedChannel
 from rail_msgs_py.train_report import LocationReport
 from rail_wayside.moving_block import Authority, MovingBlock, to_telegram
 from rail_wayside.train_bounds import Trouble
 
 #: By so much another train's signal, 30 dB below, moves a range without being noticed [m].
 _UNSEEN_M = 1.5
-#: A frame that came through two base stations is no attack.
-_HARMLESS = Reason.REPEATED
 
 
 @dataclass
 class _Caller:
     """What the desk remembers of one train."""
 
-    channel: SafeChannel
+    channel: CountedChannel
     leaves_at_m: float
     base: str | None = None
     place: tuple[float, float, float] | None = None  # time, ranged then, half-width
     held: Authority | None = None
-    accepted: int = 0
-    lost: int = 0
-    rejected: int = 0
 
 
 class Given(NamedTuple):
@@ -80,7 +75,7 @@ class AuthorityDesk:
         leaves = leaves_at_m or {}
         self._block, self._bases, self._sigmas = block, tuple(bases), fix_sigmas
         self._callers = {
-            number: _Caller(channel, leaves.get(number, inf))
+            number: _Caller(CountedChannel(channel), leaves.get(number, inf))
             for number, channel in channels.items()
         }
 
@@ -89,19 +84,15 @@ class AuthorityDesk:
         caller = self._callers.get(slot)
         if caller is None:
             return
-        opened = caller.channel.open(frame, time_ns)
-        if isinstance(opened, Rejected):
-            caller.rejected += opened.reason is not _HARMLESS
+        genuine, opened = caller.channel.open(frame, time_ns)
+        if genuine:
+            caller.base = base
+        if opened is None:
             return
-        caller.base = base
-        if not isinstance(opened, Accepted):
-            return
-        caller.accepted += 1
-        caller.lost += opened.lost
         try:
             report = LocationReport.from_bytes(opened.payload)
         except ValueError:
-            caller.rejected += 1
+            caller.channel.refuse()
             return
         self._block.report(slot, time_ns / NANOSECONDS - opened.age_s, report)
         if report.position_valid and report.front_m >= caller.leaves_at_m:
@@ -130,7 +121,7 @@ class AuthorityDesk:
             if authority is None:
                 continue
             told = to_telegram(authority, _now(caller.place, time_ns / NANOSECONDS))
-            frame = caller.channel.seal(Kind.MOVEMENT_AUTHORITY, told.to_bytes(), time_ns)
+            frame = caller.channel.channel.seal(Kind.MOVEMENT_AUTHORITY, told.to_bytes(), time_ns)
             for base in self._bases if caller.base is None else (caller.base,):
                 out[base].append((number, frame))
         return out
@@ -144,10 +135,8 @@ class AuthorityDesk:
             nan if held is None else held.end_m,
             nan if held is None else held.limit_mps,
             nan if occupied is None else occupied[0],
-            caller.channel.silence_s(time_ns),
-            caller.accepted,
-            caller.lost,
-            caller.rejected,
+            caller.channel.channel.silence_s(time_ns),
+            *caller.channel.counts,
         )
 
     def troubles(self, number: int) -> str:

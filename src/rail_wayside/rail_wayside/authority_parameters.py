@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from rail_msgs_py.parameters import ParameterError, parameter
-from rail_msgs_py.safe_channel import SafeChannel
-from rail_msgs_py.safe_frame import Kind
+from rail_msgs_py.train_channel import controller_end
 from rail_wayside.authority_desk import AuthorityDesk
 from rail_wayside.authority_limits import Segment
 from rail_wayside.moving_block import MovingBlock
 from rail_wayside.train_bounds import TrainStart
-
-CONTROLLER_IDENTITY = 0xF000
-"""Of the zone controller in the safe channel; trains have their numbers."""
-_NONCE_STREAM = 6
 
 
 @dataclass(frozen=True)
@@ -108,17 +101,6 @@ def _desk(p: AuthorityParameters) -> AuthorityDesk:
         end_margin_m=p.end_margin_m,
         validity_s=p.validity_s,
     )
-    secret = bytes.fromhex(p.secret)
-    channels = {}
-    for number in p.train_numbers:
-        bits = np.random.Philox(np.random.SeedSequence([p.seed, _NONCE_STREAM, number]))
-        channels[number] = SafeChannel(
-            secret,
-            CONTROLLER_IDENTITY,
-            number,
-            (Kind.LOCATION_REPORT,),
-            np.random.Generator(bits).bytes,
-            max_age_s=max(1.0, 3.0 * p.tick_s),
-        )
+    channels = {n: controller_end(p.secret, p.seed, n, p.tick_s) for n in p.train_numbers}
     leaves = {n: at for n, at in zip(p.train_numbers, p.leaves_at_m, strict=True) if at > 0.0}
     return AuthorityDesk(block, channels, p.bases, leaves_at_m=leaves, fix_sigmas=p.fix_sigmas)

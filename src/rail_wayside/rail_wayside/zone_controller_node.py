@@ -132,6 +132,9 @@ class ZoneControllerNode(CorridorNode):
         """Begin to speak with trains; ports of the base stations and who sends there."""
         p = self._p
         self._desk = desk_of(p)
+        self._segments = {name: number for number, name in enumerate(p.segments)}
+        # Without a desk there are no numbers.
+        self._numbers = dict(zip(p.trains, p.train_numbers, strict=False))
         self._told = {
             train: self.publisher(topics.AUTHORITY, train=train).publish
             for train in (p.trains if self._desk else ())
@@ -190,10 +193,10 @@ class ZoneControllerNode(CorridorNode):
             batch = heard.get(_port(base))
             for slot, frame in batch.frames if isinstance(batch, Telegrams) else ():
                 desk.receive(base, slot, frame, stamp_ns)
-        numbers = dict(zip(p.trains, p.train_numbers, strict=True))
+        numbers = self._numbers
         for fix in fixes:
-            segment = p.segments.index(fix.track) if fix.track in p.segments else -1
-            if segment >= 0:
+            segment = self._segments.get(fix.track)
+            if segment is not None:
                 place = (segment, fix.chainage_m, fix.variance_m2)
                 desk.ranged(numbers[fix.train], stamp_ns * 1e-9, *place)
         for base, frames in desk.telegrams(stamp_ns).items():

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rail_signals.radio_loss import Cutting, Section, Tunnel
-from rail_world.description_base import Chainage, Description, Length, Name, Number
+from rail_world.description_base import Chainage, Description, Length, Name, Number, whole_samples
 from rail_world.radio_description import Channel, Vector
 
 Antennas = Annotated[int, Field(ge=1, le=2, strict=True)]
@@ -141,11 +141,7 @@ class CbtcDescription(Description):
         ValueError
             If that is not a whole number above zero.
         """
-        exact = self.sample_rate_hz * tick_s
-        count = round(exact)
-        if count < 1 or abs(exact - count) > 1e-6:
-            raise ValueError(f"tick_s: {tick_s:g} is not a whole number of samples")
-        return count
+        return whole_samples(self.sample_rate_hz, tick_s)
 
     @model_validator(mode="after")
     def _agrees(self) -> CbtcDescription:

@@ -25,23 +25,9 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.mimo_fading import _CELLS_PER_WAVELENGTH, MimoFading
+from rail_signals.mimo_fading import MimoFading
 from rail_signals.phasors import cis
 from rail_world.cbtc_links import FloatArray, Run
-
-
-class SparseFading(MimoFading):
-    """The same field, summed wave by wave: quicker where places are as far apart as nodes are."""
-
-    def at_few(self, distance_m: FloatArray) -> NDArray[np.complex128]:
-        """Gains complex128 [rx, tx, n] at places [n], as `MimoFading.at` to its accuracy."""
-        cells = distance_m * (_CELLS_PER_WAVELENGTH / self.wavelength_m)
-        turns = cells[:, None] * self._turns[:, None, :]
-        turns -= np.rint(turns)
-        # Less than a turn is left: single precision is good to 1e-6 of a wave (-120 dB).
-        angle = (2.0 * math.pi * turns).astype(np.float32)
-        field = (self._terms[0][:, None, :] * cis(angle)).sum(axis=-1)
-        return np.asarray(field.reshape(self.receive, self.transmit, -1))
 
 
 class LinkFading:
@@ -71,7 +57,7 @@ class LinkFading:
         self._direct = math.sqrt(rician_factor) * cis(2.0 * math.pi * turns)[..., None]
         self._scale = 1.0 / math.sqrt(1.0 + rician_factor)
         self._rician = rician_factor > 0.0
-        self._field = SparseFading(rng, receive, transmit, 1.0 / self._turns_per_m)
+        self._field = MimoFading(rng, receive, transmit, 1.0 / self._turns_per_m)
 
     def gains(self, run: Run, start_s: float, stop_s: float, count: int) -> NDArray[np.complex64]:
         """Amplitude gains, path loss included, at evenly spaced moments.

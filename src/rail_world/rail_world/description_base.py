@@ -22,6 +22,21 @@ Length = Annotated[Number, Field(gt=0.0, le=LONGEST_TRACK_M)]
 Speed = Annotated[Number, Field(ge=1.0, le=600.0)]
 
 
+def whole_samples(sample_rate_hz: float, tick_s: float) -> int:
+    """Samples in a tick.
+
+    Raises
+    ------
+    ValueError
+        If that is not a whole number above zero.
+    """
+    exact = sample_rate_hz * tick_s
+    count = round(exact)
+    if count < 1 or abs(exact - count) > 1e-6:
+        raise ValueError(f"tick_s: {tick_s:g} is not a whole number of samples")
+    return count
+
+
 class Description(BaseModel):
     """Base of every description: frozen, no unknown field, no NaN, no infinity."""
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from rail_world.description_base import Chainage, Description, Name, Number
+from rail_world.description_base import Chainage, Description, Name, Number, whole_samples
 
 Decibels = Annotated[Number, Field(ge=0.0, le=200.0)]
 Volts = Annotated[Number, Field(ge=0.0, le=1e4)]
@@ -105,11 +105,7 @@ class RailDescription(Description):
         ValueError
             If that is not a whole number above zero.
         """
-        exact = self.sample_rate_hz * tick_s
-        count = round(exact)
-        if count < 1 or abs(exact - count) > 1e-6:
-            raise ValueError(f"tick_s: {tick_s:g} is not a whole number of samples")
-        return count
+        return whole_samples(self.sample_rate_hz, tick_s)
 
     @model_validator(mode="after")
     def _agrees(self) -> RailDescription:

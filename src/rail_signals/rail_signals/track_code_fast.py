@@ -36,7 +36,7 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 BoolArray: TypeAlias = NDArray[np.bool_]
 RealArray: TypeAlias = NDArray[np.floating]
 
-_BATCH_HOPS = 1024
+_BATCH_HOPS = 2048
 _PIECE_BYTES = 1 << 17
 
 

@@ -36,6 +36,8 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 _FRONT_DB = 55.0
 _FRONT_RIPPLE_DB = 2.0
 _BAND_TAPS_S = 0.1
+# Of the low-pass after the discriminator, as a part of its whole response.
+_IMPULSE_REST = 1e-4
 
 
 class RowFilter:
@@ -46,8 +48,8 @@ class RowFilter:
 
     Parameters
     ----------
-    taps : complex [n]
-        Impulse response at the input rate.
+    taps : complex or real [n]
+        Impulse response at the input rate; real ones are for real input.
     decimation
         Input samples per output; an output is of the time of the last of them.
     outputs
@@ -56,18 +58,21 @@ class RowFilter:
         Whether the input is real; else real and imaginary parts alternate.
     """
 
-    def __init__(self, taps: ComplexArray, decimation: int, outputs: int, real: bool) -> None:
+    def __init__(
+        self, taps: ComplexArray | FloatArray, decimation: int, outputs: int, real: bool
+    ) -> None:
         inputs = outputs * decimation
         reach = outputs + math.ceil((taps.size - 1) / decimation)
         index = (np.arange(reach)[None, :] + 1) * decimation - 1 - np.arange(inputs)[:, None]
         inside = (index >= 0) & (index < taps.size)
         tap = np.where(inside, taps[np.clip(index, 0, taps.size - 1)], 0)
-        parts = np.stack([tap.real, tap.imag], axis=-1).reshape(inputs, 2 * reach)
+        each = 2 if np.iscomplexobj(taps) else 1
+        parts = np.stack([tap.real, tap.imag][:each], axis=-1).reshape(inputs, each * reach)
         if not real:
             turned = np.stack([-tap.imag, tap.real], axis=-1).reshape(inputs, 2 * reach)
             parts = np.stack([parts, turned], axis=1).reshape(2 * inputs, 2 * reach)
         self._matrix = np.ascontiguousarray(parts, dtype=np.float32)
-        self._width = 2 * outputs
+        self._width = each * outputs
         self._spill = math.ceil(reach / outputs) - 1
         self.row = self._matrix.shape[0]
         self.reset()
@@ -77,7 +82,7 @@ class RowFilter:
         self._before = np.zeros((self._spill, self._matrix.shape[1]), dtype=np.float32)
 
     def filter(self, samples: SingleArray) -> SingleArray:
-        """Outputs, real and imaginary parts alternating, of whole rows of samples."""
+        """Outputs of whole rows of samples; of complex taps real and imaginary parts alternate."""
         rows = samples.reshape(-1, self.row)
         spill, width = self._spill, self._width
         product = np.empty((spill + len(rows), self._matrix.shape[1]), dtype=np.float32)
@@ -112,7 +117,8 @@ class FastDemodulator:
         self._band = RowFilter(band, 1, 2 * per_row * self._every, real=False)
         step = 2 * math.pi * chain.carrier_hz / rate
         self._cos, self._sin = np.float32(math.cos(step)), np.float32(math.sin(step))
-        self._scale = rate / (2 * math.pi)
+        impulse = impulse_response(chain.low_pass, _IMPULSE_REST) * rate / (2 * math.pi)
+        self._low_pass = RowFilter(impulse, self._every, 2 * hop_samples, real=True)
         self._chain = chain
         self.reset()
 
@@ -120,7 +126,7 @@ class FastDemodulator:
         """Forget what was received so far."""
         self._front.reset()
         self._band.reset()
-        self._low_pass = SectionFilter(self._chain.low_pass)
+        self._low_pass.reset()
         self._after = SectionFilter(np.concatenate([dc_rejecter(), self._chain.compressor]))
         self._last = np.zeros(2, dtype=np.float32)
 
@@ -160,9 +166,24 @@ class FastDemodulator:
         angle = np.arctan2(
             across * self._cos - along * self._sin, along * self._cos + across * self._sin
         )
-        low = self._low_pass.filter(angle * self._scale)
-        compressed = self._after.filter(low[self._every - 1 :: self._every])[1::2]
+        low = self._low_pass.filter(angle)
+        compressed = self._after.filter(low)[1::2]
         return compressed.reshape(hops, -1), np.asarray(amplitude, dtype=np.float64)
+
+
+def impulse_response(sections: FloatArray, rest: float) -> FloatArray:
+    """Impulse response of second-order sections, float64 [n], until only `rest` of it is left.
+
+    The rest is counted in magnitudes, as a part of all: no bounded input can make more of it.
+    """
+    longest = 64
+    while True:
+        longest *= 2
+        impulse = signal.sosfilt(sections, np.eye(1, longest)[0])
+        left = np.cumsum(np.abs(impulse)[::-1])[::-1]
+        length = int(np.count_nonzero(left > rest * left[0]))
+        if length <= longest // 2:  # the half cut off holds next to nothing
+            return np.asarray(impulse[:length])
 
 
 def equivalent_taps(chain: DemodulatorChain) -> tuple[ComplexArray, ComplexArray]:

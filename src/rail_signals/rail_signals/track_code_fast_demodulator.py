@@ -167,7 +167,7 @@ class FastDemodulator:
             across * self._cos - along * self._sin, along * self._cos + across * self._sin
         )
         low = self._low_pass.filter(angle)
-        compressed = self._after.filter(low)[1::2]
+        compressed = self._after.filter(low.astype(np.float64))[1::2]
         return compressed.reshape(hops, -1), np.asarray(amplitude, dtype=np.float64)
 
 

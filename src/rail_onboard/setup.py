@@ -5,7 +5,7 @@ package_name = "rail_onboard"
 setup(
     name=package_name,
     version="0.1.0",
-    description="On-board equipment: the vehicle ranging station.",
+    description="On-board equipment: ranging transponder, receivers and radio, train protection.",
     license="Apache-2.0",
     maintainer="Rail Corridor maintainers",
     maintainer_email="maintainers@rail-corridor.example",
@@ -17,5 +17,13 @@ setup(
     ],
     install_requires=["setuptools"],
     zip_safe=False,
-    entry_points={"console_scripts": ["vrs = rail_onboard.vrs_node:main"]},
+    entry_points={
+        "console_scripts": [
+            "vrs = rail_onboard.vrs_node:main",
+            "track_code_receiver = rail_onboard.track_code_receiver_node:main",
+            "code_supervision = rail_onboard.code_supervision_node:main",
+            "cbtc_radio = rail_onboard.cbtc_radio_node:main",
+            "atp = rail_onboard.atp_node:main",
+        ],
+    },
 )

@@ -5,7 +5,7 @@ package_name = "rail_wayside"
 setup(
     name=package_name,
     version="0.1.0",
-    description="Wayside equipment: ranging stations and zone controllers.",
+    description="Wayside equipment: ranging, track circuits, base stations, zone controllers.",
     license="Apache-2.0",
     maintainer="Rail Corridor maintainers",
     maintainer_email="maintainers@rail-corridor.example",
@@ -21,6 +21,8 @@ setup(
         "console_scripts": [
             "wrs = rail_wayside.wrs_node:main",
             "zone_controller = rail_wayside.zone_controller_node:main",
+            "track_code_transmitter = rail_wayside.track_code_transmitter_node:main",
+            "cbtc_base_station = rail_wayside.cbtc_base_station_node:main",
         ],
     },
 )

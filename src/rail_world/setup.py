@@ -5,7 +5,7 @@ package_name = "rail_world"
 setup(
     name=package_name,
     version="0.1.0",
-    description="The truth of the corridor: tracks, train motion, the radio medium and the tick.",
+    description="The truth of the corridor: tracks, train motion, the media and the tick.",
     license="Apache-2.0",
     maintainer="Rail Corridor maintainers",
     maintainer_email="maintainers@rail-corridor.example",
@@ -21,6 +21,8 @@ setup(
         "console_scripts": [
             "world = rail_world.world_node:main",
             "radio_medium = rail_world.radio_medium_node:main",
+            "rail_medium = rail_world.rail_medium_node:main",
+            "cbtc_medium = rail_world.cbtc_medium_node:main",
         ],
     },
 )

@@ -10,21 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from rail_corridor.host import NODE_CLASSES
+
 ROOT = Path(__file__).resolve().parents[2]
 PYPROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")  # tomllib is Python 3.11
 PACKAGES = sorted(path.parent.name for path in (ROOT / "src").glob("*/package.xml"))
-NODES = {
-    "rail_world": {
-        "world": "rail_world.world_node:main",
-        "radio_medium": "rail_world.radio_medium_node:main",
-    },
-    "rail_wayside": {
-        "wrs": "rail_wayside.wrs_node:main",
-        "zone_controller": "rail_wayside.zone_controller_node:main",
-    },
-    "rail_onboard": {"vrs": "rail_onboard.vrs_node:main"},
-    "rail_corridor": {"rail": "rail_corridor.cli:main"},
-}
+NODES: dict[str, dict[str, str]] = {"rail_corridor": {"rail": "rail_corridor.cli:main"}}
+for _kind, (_module, _) in NODE_CLASSES.items():
+    NODES.setdefault(_module.split(".")[0], {})[_kind] = f"{_module}:main"
 
 
 def project_value(key: str) -> str:
@@ -80,7 +73,7 @@ def test_ament_index_marker_scripts_directory_and_typing(package: str) -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_entry_points_name_functions_that_exist(package: str) -> None:
+def test_every_node_starts_on_its_own(package: str) -> None:
     assert entry_points(package) == NODES.get(package, {})
     for target in entry_points(package).values():
         module, function = target.split(":")

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from .conftest import Rail
 
 pytestmark = pytest.mark.system
-_SECONDS = 8
+_SECONDS = 6
 
 
 def _whole(report: dict[str, Any]) -> bool:

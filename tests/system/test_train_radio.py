@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+import yaml
+
+from rail_corridor.scenario import builtin_scenarios
 
 if TYPE_CHECKING:
     from .conftest import Rail
 
 pytestmark = pytest.mark.system
+
+
+#: The first stops by itself at this time [s].
+_STOPS_S = 40.0
+
+
+def _written(folder: Path, **changes: Any) -> Path:
+    """File of `moving_block` with fields of its top level changed."""
+    path = folder / "run.yaml"
+    data = yaml.safe_load(builtin_scenarios()["moving_block"].read_text())
+    path.write_text(json.dumps(data | changes))
+    return path
 
 
 def _is_safe(train: dict[str, Any]) -> bool:
@@ -20,24 +37,35 @@ def _is_safe(train: dict[str, Any]) -> bool:
 
 
 def test_trains_follow_at_braking_distance_and_stop_behind_one_that_stops(rail: Rail) -> None:
-    report = rail.report("moving_block", "--duration", 95)
+    stop = {"kind": "train_stop", "train": "first", "from_s": _STOPS_S, "to_s": 90.0}
+    path = _written(rail.directory, faults=[stop], duration_s=62.0)
+    report = rail.report(path, "--processes", "one")
     trains = report["trains"]
     assert all(_is_safe(train) for train in trains.values())
     assert report["missing_ticks"] == 0
     assert report["failures"] == []
-    # The first stops from 70 to 110 s; those behind come close, and stay apart.
-    assert trains["first"]["distance_m"] > 600.0
+    # The first stops; those behind come close, and stay apart.
+    assert trains["first"]["distance_m"] > 350.0
     for name in ("second", "third", "fourth"):
-        assert 600.0 < trains[name]["distance_m"] < trains["first"]["distance_m"] + 350.0
+        assert 350.0 < trains[name]["distance_m"] < trains["first"]["distance_m"] + 350.0
         assert 10.0 < trains[name]["atp"]["margin_min_m"] < 250.0
     for train in trains.values():
-        assert train["cbtc"]["frames"] > 700
+        assert train["cbtc"]["frames"] > 450
         assert train["cbtc"]["age_p95_s"] < 1.0
 
 
 def test_the_same_to_the_last_bit_wherever_the_nodes_live(rail: Rail) -> None:
+    path = _written(
+        rail.directory,
+        tracks={"main": {"elements": [{"straight_m": 1000}], "speed_limits": [[0, 80]]}},
+        trains=[
+            {"name": name, "route": ["main"], "start_m": start_m}
+            for name, start_m in (("first", 500), ("second", 150))
+        ],
+        faults=[],
+        duration_s=6.0,
+    )
     digests = {
-        rail.report("moving_block", "--duration", 6, "--processes", placement)["digest"]
-        for placement in ("one", "site")
+        rail.report(path, "--processes", placement)["digest"] for placement in ("one", "site")
     }
     assert len(digests) == 1

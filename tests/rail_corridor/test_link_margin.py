@@ -69,7 +69,8 @@ def test_theory_falls_with_the_level_and_follows_diversity() -> None:
     assert rates["siso"] > rates["alamouti_2x1"] > rates["mrc"] > rates["alamouti_2x2"]
 
 
-def test_a_row_counts_frames_in_the_stretch_and_headways_at_its_checkpoints() -> None:
+def a_run() -> dict[str, object]:
+    """Report of a run of two trains."""
     # On the line for 100 s at 0.25 s; the stretch begins at the third tenth.
     first = train([1.0, 2.0, 20.0, 30.0, 40.0, 50.0, None, None, None], 760, 100)
     second = train([1.0, 2.0, 40.0, 55.0, 66.0, None, None, None, None], 780, 120)
@@ -83,8 +84,11 @@ def test_a_row_counts_frames_in_the_stretch_and_headways_at_its_checkpoints() ->
             ("b", "no authority", 70.0),
         )
     ]
-    report = {"sim_time_s": 100.0, "trains": {"a": first, "b": second}, "events": events}
-    row = aggregate(Point("mrc", 30.0), report, TOLD)
+    return {"sim_time_s": 100.0, "trains": {"a": first, "b": second}, "events": events}
+
+
+def test_a_row_counts_frames_in_the_stretch_and_headways_at_its_checkpoints() -> None:
+    row = aggregate(Point("mrc", 30.0), [a_run()], TOLD)
     assert row.headway_s == pytest.approx(25.5)
     assert (row.unpassed, row.passings, row.brakings) == (1, 6, 2)
     assert row.train_hours == pytest.approx(140.0 / 3600.0)
@@ -94,9 +98,17 @@ def test_a_row_counts_frames_in_the_stretch_and_headways_at_its_checkpoints() ->
     assert row.brakings_per_hour == pytest.approx(2.0 * 3600.0 / 140.0)
 
 
+def test_runs_that_differ_in_their_seeds_are_one_row() -> None:
+    one = aggregate(Point("mrc", 30.0), [a_run()], TOLD)
+    two = aggregate(Point("mrc", 30.0), [a_run()] * 2, TOLD)
+    assert two.brakings == 2 * one.brakings and two.passings == 2 * one.passings
+    assert two.train_hours == pytest.approx(2.0 * one.train_hours)
+    assert two.frame_loss == one.frame_loss and two.headway_s == one.headway_s
+
+
 def test_a_run_in_which_nobody_came_to_the_stretch() -> None:
     report = {"sim_time_s": 100.0, "trains": {"a": train([None] * 9, 0, 0)}, "events": []}
-    row = aggregate(Point("siso", 60.0), report, TOLD)
+    row = aggregate(Point("siso", 60.0), [report], TOLD)
     assert row.frame_loss is None and row.headway_s is None and row.brakings_per_hour is None
     assert row.unpassed == row.passings == 3
 

@@ -326,6 +326,9 @@ def sweep(
         Path, typer.Option("--out", help="Folder for picture and figures.", metavar="DIR")
     ] = Path("link_margin"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points.")] = False,
+    seeds: Annotated[
+        int, typer.Option("--seeds", help="Runs of each point.", metavar="N", min=1, max=100)
+    ] = 1,
 ) -> None:
     """Run one situation over a range of parameters: a table, a picture, and JSON."""
     _choice("WHAT", what, ("link_margin",))
@@ -339,7 +342,7 @@ def sweep(
     from .link_margin import run_link_margin
 
     try:
-        run_link_margin(out, quick, Console())
+        run_link_margin(out, quick, Console(), seeds)
     except RunFailedError as error:
         print(f"rail: {error}", file=sys.stderr)
         raise typer.Exit(1) from None

@@ -16,7 +16,7 @@ import os
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from queue import Queue
@@ -67,7 +67,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Row:
-    """What came of one point.
+    """What came of one point, of one run or of several that differ in their seeds.
 
     ``es_n0_db`` median in the stretch of the mean Es/N0 per receive antenna [dB];
     ``frame_loss`` share of the frames, both ways, that were not accepted as data, all losses
@@ -152,48 +152,54 @@ def scenario_data(point: Point) -> dict[str, Any]:
     }
 
 
-def aggregate(point: Point, report: Mapping[str, Any], prediction: Prediction) -> Row:
-    """Row of a point from the report of its run; trains are in the order in which they run."""
-    trains = list(report["trains"].values())
-    end_s = float(report["sim_time_s"])
+def aggregate(point: Point, reports: Sequence[Mapping[str, Any]], prediction: Prediction) -> Row:
+    """Row of a point from the reports of its runs; trains are in the order in which they run."""
     begin, *places = (PASSED_AT.index(share) for share in (STRETCH_FROM, *CHECKPOINTS))
-    sent = accepted = 0
-    inside_s = 0.0
-    for train in trains:
-        entered_s = train["cbtc"]["passed_s"][begin]
-        if entered_s is None:
-            continue
-        inside_s += end_s - entered_s
-        sent += 2 * round((end_s - entered_s) / TICK_S)
-        # One each way in a tick; on the good link before the stretch they are all accepted.
-        before = 2 * round(entered_s / TICK_S)
-        accepted += max(0, train["cbtc"]["frames"] - train["cbtc"]["lost"] - before)
+    sent = accepted = unpassed = passings = brakings = passed_authority = 0
+    inside_s = without_s = 0.0
     headways_s: list[float] = []
-    unpassed = 0
-    for place in places:
-        times_s = [train["cbtc"]["passed_s"][place] for train in trains]
-        unpassed += times_s.count(None)
-        headways_s += [
-            after - ahead
-            for ahead, after in pairwise(times_s)
-            if ahead is not None and after is not None
-        ]
+    ages_s: list[float] = []
+    for report in reports:
+        trains = list(report["trains"].values())
+        end_s = float(report["sim_time_s"])
+        for train in trains:
+            passed_authority += train["atp"]["passed_authority"]
+            without_s += train["cbtc"]["without_authority_s"]
+            if train["cbtc"]["age_p95_s"] is not None:
+                ages_s.append(train["cbtc"]["age_p95_s"])
+            entered_s = train["cbtc"]["passed_s"][begin]
+            if entered_s is None:
+                continue
+            inside_s += end_s - entered_s
+            sent += 2 * round((end_s - entered_s) / TICK_S)
+            # One each way in a tick; on the good link before the stretch they are all accepted.
+            before = 2 * round(entered_s / TICK_S)
+            accepted += max(0, train["cbtc"]["frames"] - train["cbtc"]["lost"] - before)
+        for place in places:
+            times_s = [train["cbtc"]["passed_s"][place] for train in trains]
+            unpassed += times_s.count(None)
+            headways_s += [
+                after - ahead
+                for ahead, after in pairwise(times_s)
+                if ahead is not None and after is not None
+            ]
+        passings += len(trains) * len(places)
+        brakings += _brakings(report, begin)
     headways_s.sort()
-    ages_s = [t["cbtc"]["age_p95_s"] for t in trains if t["cbtc"]["age_p95_s"] is not None]
     return Row(
         scheme=point.scheme,
         loss_db=point.loss_db,
         es_n0_db=prediction.es_n0_db,
         frame_loss=min(1.0, max(0.0, 1.0 - accepted / sent)) if sent else None,
         age_p95_s=max(ages_s, default=None),
-        without_authority_s=sum(t["cbtc"]["without_authority_s"] for t in trains),
+        without_authority_s=without_s,
         headway_s=sum(headways_s) / len(headways_s) if headways_s else None,
         headway_p95_s=headways_s[int(0.95 * (len(headways_s) - 1))] if headways_s else None,
         unpassed=unpassed,
-        passings=len(trains) * len(places),
-        brakings=_brakings(report, begin),
+        passings=passings,
+        brakings=brakings,
         train_hours=inside_s / 3600.0,
-        passed_authority=sum(train["atp"]["passed_authority"] for train in trains),
+        passed_authority=passed_authority,
         prediction=prediction,
     )
 
@@ -222,10 +228,11 @@ def rate_interval(count: int, hours: float) -> tuple[float, float]:
     return low / hours, float(chi2.ppf(0.975, 2 * count + 2)) / 2.0 / hours
 
 
-def run_link_margin(out_dir: Path, quick: bool, console: Console) -> list[Row]:
+def run_link_margin(out_dir: Path, quick: bool, console: Console, seeds: int = 1) -> list[Row]:
     """Run the sweep; write ``link_margin.json`` and ``link_margin.png``, show the table.
 
-    Runs go two at a time in the ROS domain of this process and the next one.
+    Each point is run with so many seeds. Runs go two at a time in the ROS domain of this process
+    and the next one.
 
     Raises
     ------
@@ -244,25 +251,31 @@ def run_link_margin(out_dir: Path, quick: bool, console: Console) -> list[Row]:
 
     failed: list[str] = []
 
-    def run(point: Point) -> Row | None:
+    def run(point: Point) -> dict[str, Any] | None:
         domain = domains.get()
         try:
             data = scenario_data(point)
             report = faultless_report_of(
                 data, data["name"], timeout_s=_RUN_TIMEOUT_S, domain=domain
             )
-            row = aggregate(point, report, predict(Scenario.model_validate(data)))
         except (RunFailedError, subprocess.TimeoutExpired) as error:
             failed.append(str(error))
             return None
         finally:
             domains.put(domain)
-        console.print(f"{point.name}: {row.brakings} spurious brakings", style="dim")
-        return row
+        console.print(f"{point.name}, seed {point.seed}: done", style="dim")
+        return report
 
+    every = points(SCHEMES, losses, quick=quick)
+    each = [replace(point, seed=point.seed + n) for point in every for n in range(seeds)]
     with ThreadPoolExecutor(_WORKERS) as pool:
-        found = list(pool.map(run, points(SCHEMES, losses, quick=quick)))
-    rows = [row for row in found if row is not None]
+        found = list(pool.map(run, each))
+    rows = []
+    for index, point in enumerate(every):
+        reports = [r for r in found[index * seeds : (index + 1) * seeds] if r is not None]
+        if reports:
+            prediction = predict(Scenario.model_validate(scenario_data(point)))
+            rows.append(aggregate(point, reports, prediction))
     rows.sort(key=lambda row: (SCHEMES.index(row.scheme), row.es_n0_db))
     write_rows(rows, out_dir / "link_margin.json")
     draw_link_margin(rows, out_dir / "link_margin.png")

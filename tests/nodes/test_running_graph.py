@@ -23,8 +23,13 @@ RAILS = [
     *(topics.CIRCUIT_TX, topics.CIRCUIT_RX, topics.OCCUPANCY),
     *(topics.CODE_SENT, topics.CODE_RX, topics.CODE_RECEIVED),
 ]
+THREATS = [topics.BACKBONE_DOWN, topics.BACKBONE_UP, topics.STRIKES]
 #: Scenarios with every kind of node between them, and the topics that each does without.
-SCENARIOS = {"follow_codes": RADIO, "moving_block": RAILS}
+SCENARIOS = {
+    "follow_codes": RADIO,
+    "moving_block": [*RAILS, *THREATS],
+    "hostile_network": RAILS,
+}
 #: What rclpy itself offers beside the corridor's topics.
 ROS_OWN = ("/rosout", "/parameter_events")
 

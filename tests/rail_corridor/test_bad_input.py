@@ -39,6 +39,7 @@ GOOD: dict[str, Any] = {
         {"kind": "jam", "channel": 2, "from_s": 1, "to_s": 2, "track": "main", "at_m": 100},
     ],
 }
+THREAT = {"kind": "threat", "threats": ["delay"], "rate": 0.1}
 REMOVED = object()
 
 
@@ -199,6 +200,17 @@ WRONG: list[tuple[str, object, str, str]] = [
     ("faults.1.track", "nowhere", "faults.1.track", "no such track"),
     ("faults.1.at_m", 1500, "faults.1.at_m", "off main"),
     ("faults.1.power_dbm", float("-inf"), "faults.1.power_dbm", "finite"),
+    ("faults.0", {**THREAT}, "faults.0.kind: 'threat'", "goes with cbtc, of which there is none"),
+    ("faults.0", {**THREAT, "threats": ["dely"]}, "faults.0.threats.0: 'dely'", "'delay'"),
+    ("faults.0", {**THREAT, "threats": []}, "faults.0.threats", "at least 1"),
+    ("faults.0", {**THREAT, "threats": "delay"}, "faults.0.threats: 'delay'", "tuple"),
+    ("faults.0", {**THREAT, "threats": ["delay", "delay"]}, "faults.0.threats", "comes twice"),
+    ("faults.0", {**THREAT, "rate": 1.01}, "faults.0.rate: 1.01", "less than or equal to 1"),
+    ("faults.0", {**THREAT, "rate": -0.1}, "faults.0.rate: -0.1", "greater than or equal to 0"),
+    ("faults.0", {**THREAT, "rate": True}, "faults.0.rate: True", "truth value"),
+    ("faults.0", {"kind": "threat", "threats": ["delay"]}, "faults.0.rate", "needed"),
+    ("faults.0", {**THREAT, "longest_delay_s": 1e4}, "faults.0.longest_delay_s", "3600"),
+    ("faults.0", {**THREAT, "from_s": 5, "to_s": 5}, "faults.0.to_s: 5", "after from_s, 5 s"),
     ("description", "x" * 100_000, "description", "at most 1000 characters"),
     ("description", "line\nbreak" * 200, "description", "at most 1000 characters"),
     ("seed", 10**1000, "seed", ""),

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rail_corridor.cbtc_plan import CBTC_MEDIUM
 from rail_corridor.launcher import default_placement
 from rail_corridor.plan import (
     CONTROLLER,
@@ -20,6 +21,7 @@ from rail_corridor.plan import (
 )
 from rail_corridor.scenario import Overrides, load_scenario
 from rail_corridor.world_plan import reach_m, survey
+from rail_msgs_py.cbtc_topics import BACKBONE
 from rail_world.world_file import read_world_file
 
 
@@ -44,6 +46,25 @@ def test_timeouts_fall_so_that_the_nearest_to_the_fault_notices_first(tmp_path: 
     wait_s = {spec.name: spec.parameters.get("timeout_s", math.nan) for spec in plan.nodes}
     # Two passes of the medium, then the controller, then the world.
     assert wait_s[MEDIUM] < wait_s[CONTROLLER] < wait_s[WORLD] == 5.0
+
+
+def test_the_backbone_is_there_with_threats_only(tmp_path: Path) -> None:
+    calm, hostile = (plan_of(name, tmp_path) for name in ("moving_block", "hostile_network"))
+    names = [spec.name for spec in hostile.nodes]
+    assert set(names) - {spec.name for spec in calm.nodes} == {BACKBONE}
+    worlds = [next(s.parameters for s in p.nodes if s.name == WORLD) for p in (calm, hostile)]
+    assert set(worlds[1]["sinks"]) - set(worlds[0]["sinks"]) == {BACKBONE}
+    assert worlds[1]["clock_readers"] == worlds[0]["clock_readers"] + 1
+    for plan, there in ((calm, False), (hostile, True)):
+        fed = [spec for spec in plan.nodes if spec.kind in ("zone_controller", "cbtc_base_station")]
+        assert len(fed) > 2 and all(spec.parameters["backbone"] is there for spec in fed)
+        assert bool(plan.world.threats) is there
+    wait_s = {spec.name: spec.parameters.get("timeout_s", math.nan) for spec in hostile.nodes}
+    (backbone,) = (spec for spec in hostile.nodes if spec.name == BACKBONE)
+    # The medium, the way up, the controller, the way down, the world.
+    assert wait_s[CBTC_MEDIUM] < wait_s[BACKBONE] < wait_s[CONTROLLER]
+    assert wait_s[CONTROLLER] < backbone.parameters["controller_timeout_s"] < wait_s[WORLD]
+    assert backbone.site == "world"
 
 
 @pytest.mark.parametrize("placement", ["one", "site", "node"])

@@ -108,5 +108,21 @@ def test_the_table_shows_failures_and_events(tmp_path: Path) -> None:
     assert "undisturbed" not in text
 
 
+def test_threats_are_shown_where_there_are_any(tmp_path: Path) -> None:
+    report = report_of(tmp_path, 40)
+    assert "threats" not in report and "threats" not in shown(report)
+    report["threats"] = {"frames": 120, "strikes": {"deletion": 7, "delay": 0}}
+    link = {"rejected": 5, "forged_accepted": 1, "forged_reports": 2}
+    report["trains"]["train_a"]["cbtc"] = link | dict.fromkeys(
+        ("frames", "lost", "age_p95_s", "handovers"), 0
+    )
+    report["trains"]["train_a"]["atp"] = dict.fromkeys(
+        ("interventions", "emergency_brakes", "passed_authority", "margin_min_m"), 0
+    )
+    text = " ".join(shown(report).split())
+    assert "threats to 120 frames: deletion 7, delay 0; 5 rejected" in text
+    assert "forged and taken: 1 authorities, 2 reports" in text
+
+
 def test_a_run_that_never_began_is_shown_as_well(tmp_path: Path) -> None:
     assert "0 ticks" in shown(report_of(tmp_path, 0))

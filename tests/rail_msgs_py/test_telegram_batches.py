@@ -27,6 +27,13 @@ def test_frames_of_a_slot() -> None:
     assert Telegrams(0, FRAMES).in_slot(2) == []
 
 
+def test_the_newest_frame_of_each_slot_that_is_there() -> None:
+    batch = Telegrams(0, (*FRAMES, (0, bytes(64)), (2, b"\1" * 64)))
+    assert batch.newest(2) == {1: FRAMES[2][1], 2: b"\1" * 64}
+    assert batch.newest(300).keys() == {1, 2, 300}
+    assert Telegrams(0, ()).newest(8) == {}
+
+
 def test_other_lengths_and_layouts_are_refused() -> None:
     with pytest.raises(ValueError, match="64 bytes, got 3"):
         Telegrams(0, ((1, b"abc"),)).to_msg()

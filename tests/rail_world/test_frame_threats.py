@@ -138,6 +138,34 @@ def test_masquerades_are_never_frames_of_their_link() -> None:
     assert 0.2 < len(brought) / len(attacks) < 0.8  # as it was sent, to another end
 
 
+def test_rates_may_change_on_the_way() -> None:
+    radio = FrameThreats(ThreatRates(), np.random.default_rng(1))
+    for number in range(300):
+        if number == 100:
+            radio.act(ThreatRates(deletion=1.0), 3.0)
+        elif number == 200:
+            radio.act(ThreatRates(delay=1.0), 0.5)
+        radio.send(LINKS[0], frame_of(number), number * PERIOD_NS)
+    arrived = radio.arrivals(10**12)
+    assert radio.strikes == {Threat.DELETION: 100, Threat.DELAY: 100}
+    numbers = [int.from_bytes(a.frame, "big") for a in arrived]
+    assert numbers[:100] == list(range(100)) and sorted(numbers[100:]) == list(range(200, 300))
+    assert 0.45 < max(a.time_ns - a.sent_ns for a in arrived) * 1e-9 <= 0.5
+
+
+def test_to_act_as_before_changes_nothing() -> None:
+    rates = ThreatRates(**dict.fromkeys((threat.value for threat in Threat), 0.3))
+    arrived = []
+    for again in (False, True):
+        radio = FrameThreats(rates, np.random.default_rng(1), longest_delay_s=2.0)
+        for number in range(FRAMES):
+            if again:
+                radio.act(rates, 2.0)
+            radio.send(LINKS[number % 4], frame_of(number), number * PERIOD_NS)
+        arrived.append(radio.arrivals(10**12))
+    assert arrived[0] == arrived[1]
+
+
 def test_memory_is_bounded() -> None:
     rates = ThreatRates(repetition=0.3, resequencing=0.3, delay=0.3)
     radio = FrameThreats(rates, np.random.default_rng(1), longest_delay_s=1.0, memory=8)
@@ -156,3 +184,5 @@ def test_bad_values_are_quoted() -> None:
         ThreatRates(masquerade=math.nan)
     with pytest.raises(ValueError, match=r"memory .* got 0"):
         FrameThreats(ThreatRates(), np.random.default_rng(1), memory=0)
+    with pytest.raises(ValueError, match=r"longest_delay_s .* got -1"):
+        FrameThreats(ThreatRates(), np.random.default_rng(1)).act(ThreatRates(), -1.0)

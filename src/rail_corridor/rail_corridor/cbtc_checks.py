@@ -10,7 +10,7 @@ from rail_signals.radio_slots import RadioSlots
 from .cbtc_plan import burst_format
 from .cbtc_section import CbtcPlan
 from .errors import InputError
-from .fault_sections import DeadBaseStation, TrainStop
+from .fault_sections import DeadBaseStation, NetworkThreats, TrainStop
 
 if TYPE_CHECKING:
     from .scenario import Scenario
@@ -97,7 +97,7 @@ def _check_faults(scenario: Scenario) -> None:
                 field=f"faults.{index}.train",
                 value=fault.train,
             )
-        if not isinstance(fault, DeadBaseStation):
+        if not isinstance(fault, DeadBaseStation | NetworkThreats):
             continue
         if not bases:
             raise InputError(
@@ -105,7 +105,7 @@ def _check_faults(scenario: Scenario) -> None:
                 field=f"faults.{index}.kind",
                 value=fault.kind,
             )
-        if fault.base not in bases:
+        if isinstance(fault, DeadBaseStation) and fault.base not in bases:
             raise InputError(
                 f"there is no such base station, they are {bases[0]} ... {bases[-1]}",
                 field=f"faults.{index}.base",

@@ -19,11 +19,10 @@ from rail_msgs_py.topics import (
 from .recording import FloatArray, Recording
 from .scenario import Scenario
 from .supervision_metrics import supervision_metrics
+from .threat_metrics import forged_authorities, report_metrics
 
 #: Fractions of its first track at which the passing of a train's front is timed.
 PASSED_AT: Final = tuple(tenth / 10.0 for tenth in range(1, 10))
-#: What rounding on the wire may take off an authority [m].
-_ROUNDING_M = 0.011
 
 _STATE = {name: index for index, name in enumerate(STATE_COLUMNS)}
 _ATP = {name: index for index, name in enumerate(ATP_COLUMNS)}
@@ -47,6 +46,7 @@ def cbtc_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[s
     passed, withdrawn = _passed(scenario, on_line, front_m, speed_mps, end_m)
     return {
         "cbtc": _link(scenario, on_line, atp, given, radio, links)
+        | report_metrics(scenario, recording, index)
         | _location(on_line, front_m, atp)
         | {"passed_s": _passed_s(scenario, index, mine, on_line)},
         "atp": supervision_metrics(scenario, recording, index, on_line)
@@ -115,7 +115,7 @@ def _link(
         "frames": int(accepted + lost),
         "lost": int(lost),
         "rejected": int(rejected),
-        "forged_accepted": _forged(atp, given),
+        "forged_accepted": forged_authorities(scenario.tick_s, atp, given),
         "age_median_s": float(np.median(age_s)) if age_s.size else None,
         "age_p95_s": float(np.quantile(age_s, 0.95)) if age_s.size else None,
         "without_authority_s": float(lost_s * scenario.tick_s),
@@ -150,18 +150,6 @@ def _last(table: FloatArray, column: int) -> float:
     counts = table[:, column]
     counts = counts[~np.isnan(counts)]
     return float(counts[-1]) if counts.size else 0.0
-
-
-def _forged(atp: FloatArray, given: FloatArray) -> int:
-    """Authorities in force on board that nobody has given to this train."""
-    issued = given[:, _AUTHORITY["end_of_authority_m"]]
-    issued = np.unique(issued[np.isfinite(issued)])
-    held = atp[:, _ATP["end_of_authority_m"]]
-    held = np.unique(held[np.isfinite(held)])
-    if not issued.size:
-        return int(held.size)
-    near = np.clip(np.searchsorted(issued, held - 1e-6), 0, issued.size - 1)
-    return int(np.count_nonzero(np.abs(issued[near] - held) > _ROUNDING_M))
 
 
 def _location(

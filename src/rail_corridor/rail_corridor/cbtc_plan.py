@@ -6,18 +6,20 @@ import hashlib
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+from rail_msgs_py.cbtc_topics import BACKBONE
 from rail_msgs_py.safe_frame import FRAME_BYTES
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.radio_burst import RadioBurstFormat
 from rail_signals.space_time_block import scheme
 from rail_signals.symbol_mapping import constellation
 from rail_world.cbtc_description import BaseStation, CbtcDescription, CbtcFault, LossSection
+from rail_world.threat_description import ThreatPeriod
 from rail_world.track import Track
 from rail_world.vehicle import Vehicle
 
 from .base_stations import Base
 from .cbtc_section import CbtcPlan
-from .fault_sections import DeadBaseStation
+from .fault_sections import DeadBaseStation, NetworkThreats
 from .node_spec import NodeSpec
 
 if TYPE_CHECKING:
@@ -93,6 +95,15 @@ def cbtc_description(scenario: Scenario) -> CbtcDescription | None:
     )
 
 
+def threat_periods(scenario: Scenario) -> tuple[ThreatPeriod, ...]:
+    """What an intruder does to the frames on the backbone; without any there is no backbone."""
+    return tuple(
+        ThreatPeriod(**fault.model_dump(exclude={"kind"}))
+        for fault in scenario.faults
+        if isinstance(fault, NetworkThreats)
+    )
+
+
 def cbtc_nodes(scenario: Scenario, world_file: str, timeout_s: float) -> list[NodeSpec]:
     """Nodes of train control by radio; none without it."""
     plan = scenario.cbtc
@@ -105,8 +116,13 @@ def cbtc_nodes(scenario: Scenario, world_file: str, timeout_s: float) -> list[No
         "timeout_s": 2 * timeout_s / 5,
     }
     nodes = [NodeSpec("cbtc_medium", CBTC_MEDIUM, "world", medium)]
+    threatened = bool(threat_periods(scenario))
+    if threatened:
+        # It waits longer than the medium for base stations, and longer than the controller for it.
+        waits = {"timeout_s": timeout_s / 2, "controller_timeout_s": 4 * timeout_s / 5}
+        nodes.append(NodeSpec("backbone", BACKBONE, "world", {"world_file": world_file} | waits))
     for base in scenario.bases:
-        parameters = radio | _base(plan, base, timeout_s / 5)
+        parameters = radio | _base(plan, base, timeout_s / 5) | {"backbone": threatened}
         nodes.append(
             NodeSpec("cbtc_base_station", f"/wayside/{base.name}/cbtc", "wayside", parameters)
         )
@@ -212,6 +228,7 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
     beyond_m = _BEYOND_M if all(train.leaves_on_arrival for train in by_departure) else 0.0
     return {
         "bases": tuple(base.name for base in scenario.bases),
+        "backbone": bool(threat_periods(scenario)),
         "segments": tuple(tracks),
         "segment_lengths_m": tuple(track.length_m + beyond_m for track in tracks.values()),
         "limit_counts": tuple(len(steps) for steps in limits.values()),

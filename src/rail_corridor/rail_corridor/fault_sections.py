@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rail_world.description import Chainage, Description, Name, Number
+from rail_world.threat_description import LONGEST_DELAY_S, LongestDelay, Rate, Threats
 
 from .section_fields import ChannelNumber, Power, Time
 
@@ -68,7 +69,24 @@ class TrainStop(_Fault):
     train: Name = Field(description="the train")
 
 
+class NetworkThreats(_Fault):
+    """An intruder between zone controller and base stations: threats of EN 50159 to frames.
+
+    Where periods overlap, they strike independently of each other.
+    """
+
+    kind: Literal["threat"]
+    threats: Threats = Field(
+        description="some of repetition, deletion, insertion, resequencing, corruption, delay, "
+        "masquerade"
+    )
+    rate: Rate = Field(description="probability of each for a frame, either way")
+    longest_delay_s: LongestDelay = Field(
+        default=LONGEST_DELAY_S, description="a delay is drawn evenly from 0 to this [s]"
+    )
+
+
 Fault = Annotated[
-    DeadStation | Jam | Sanding | DeadTransmitter | DeadBaseStation | TrainStop,
+    DeadStation | Jam | Sanding | DeadTransmitter | DeadBaseStation | TrainStop | NetworkThreats,
     Field(discriminator="kind"),
 ]

@@ -27,6 +27,7 @@ NODE_CLASSES = {
     "track_code_receiver": ("rail_onboard.track_code_receiver_node", "TrackCodeReceiverNode"),
     "code_supervision": ("rail_onboard.code_supervision_node", "CodeSupervisionNode"),
     "cbtc_medium": ("rail_world.cbtc_medium_node", "CbtcMediumNode"),
+    "backbone": ("rail_world.backbone_node", "BackboneNode"),
     "cbtc_base_station": ("rail_wayside.cbtc_base_station_node", "CbtcBaseStationNode"),
     "cbtc_radio": ("rail_onboard.cbtc_radio_node", "CbtcRadioNode"),
     "atp": ("rail_onboard.atp_node", "AtpNode"),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
 from rail_msgs_py import topics
@@ -16,7 +17,7 @@ from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.position import figures_from_cdr as position_from_cdr
 from rail_msgs_py.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.stamps import to_ns
-from rail_msgs_py.table import figures_from_cdr
+from rail_msgs_py.table import Table, figures_from_cdr
 from rail_msgs_py.topic import Topic
 
 from .plan import Plan
@@ -62,8 +63,14 @@ class Observer(CorridorNode):
         channels = len({antenna.downlink_channel for antenna in radio.stations})
         rails = plan.world.rails
         circuits = () if rails is None else tuple(circuit.name for circuit in rails.circuits)
-        cbtc = plan.world.cbtc is not None
-        self.recording = Recording(radio.trains, tracks, channels, circuits, cbtc=cbtc)
+        self.recording = Recording(
+            radio.trains,
+            tracks,
+            channels,
+            circuits,
+            cbtc=plan.world.cbtc is not None,
+            threatened=bool(plan.world.threats),
+        )
         self._width = 2 + channels
         self.failures: list[dict[str, Any]] = []
         self.events: list[dict[str, Any]] = []
@@ -104,7 +111,9 @@ class Observer(CorridorNode):
         if not self.recording.trains:
             return True
         last = self.finished_ticks - 1
-        return all(
+        if self.recording.threatened:
+            records = (*records, self.recording.strikes)
+        return self.recording.reports.have(last) and all(
             record.ticks > last and not np.isnan(record.upto(last + 1)[last, :, 0]).any()
             for record in records
         )
@@ -129,7 +138,10 @@ class Observer(CorridorNode):
             self._record(recording.radio, topics.RADIO_LINK, index, train=train)
             self._record(recording.atp, topics.ATP_STATE, index, train=train)
             self._record(recording.authority, topics.AUTHORITY, index, train=train)
+            self._record_reports(index, train)
             self._record_command(index, train, "atp")
+        if recording.threatened:
+            self._record(recording.strikes, topics.STRIKES, 0)
 
         def put(raw: bytes) -> None:
             links = recording.cbtc_links
@@ -137,6 +149,13 @@ class Observer(CorridorNode):
             links.put(stamp_ns // self._tick_ns, slice(None), figures)
 
         self.stream_in(topics.CBTC_LINKS, put)
+
+    def _record_reports(self, index: int, train: str) -> None:
+        def put(raw: bytes) -> None:
+            table = Table.from_msg(deserialize_message(raw, topics.REPORTS.type))
+            self.recording.reports.put(table.stamp_ns // self._tick_ns, index, table.values)
+
+        self.stream_in(topics.REPORTS, put, train=train)
 
     def _record_command(self, index: int, train: str, supervision: str) -> None:
         command = self.recording.command

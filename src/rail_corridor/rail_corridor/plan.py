@@ -134,7 +134,7 @@ def make_plan(
     ]
     others = [medium, controller, *equipment, *more]
     sinks = [MEDIUM, CONTROLLER, *(spec.name for spec in more if spec.side == "world")]
-    clocked = {"wrs", "track_code_transmitter", "cbtc_base_station", "cbtc_radio"}
+    clocked = {"wrs", "track_code_transmitter", "cbtc_base_station", "cbtc_radio", "backbone"}
     supervision = scenario.supervision
     parameters = {
         "world_file": str(world_path),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,27 @@ class Record:
         return self._values[:ticks]
 
 
+class ReportsTaken:
+    """Location reports that were taken from each train: any number in a tick."""
+
+    def __init__(self, trains: int) -> None:
+        self._rows: list[dict[int, FloatArray]] = [{} for _ in range(trains)]
+
+    def put(self, tick: int, train: int, rows: FloatArray) -> None:
+        """Store the reports [report, column] of one tick."""
+        self._rows[train][tick] = rows
+
+    def of(self, train: int) -> Iterator[tuple[int, FloatArray]]:
+        """Tick and columns of each report of a train, in the order of their taking."""
+        for tick, rows in sorted(self._rows[train].items()):
+            for row in rows:
+                yield tick, row
+
+    def have(self, tick: int) -> bool:
+        """Whether those of a tick are here, of every train."""
+        return all(tick in ticks for ticks in self._rows)
+
+
 class Recording:
     """Truth, links, channels and positions of all trains.
 
@@ -49,6 +71,8 @@ class Recording:
         Names of the track circuits, in the order of the scenario; with any, trains obey codes.
     cbtc : bool
         Whether trains obey authorities received by radio.
+    threatened : bool
+        Whether a backbone with threats carries their telegrams.
     """
 
     def __init__(
@@ -59,6 +83,7 @@ class Recording:
         circuits: tuple[str, ...] = (),
         *,
         cbtc: bool = False,
+        threatened: bool = False,
     ) -> None:
         from rail_msgs_py.topics import (
             ATP_COLUMNS,
@@ -70,6 +95,7 @@ class Recording:
             RECEIVED_COLUMNS,
             SENT_COLUMNS,
             STATE_COLUMNS,
+            STRIKE_COLUMNS,
         )
 
         self.trains = trains
@@ -82,6 +108,9 @@ class Recording:
         self.atp = Record(len(trains), len(ATP_COLUMNS))
         self.authority = Record(len(trains), len(AUTHORITY_COLUMNS))
         self.radio = Record(len(trains), len(RADIO_COLUMNS))
+        self.reports = ReportsTaken(len(trains) if cbtc else 0)
+        self.threatened = threatened
+        self.strikes = Record(1, len(STRIKE_COLUMNS))
         self.cbtc_links = Record(len(trains), len(CBTC_LINK_COLUMNS))
         self.state = Record(len(trains), len(STATE_COLUMNS))
         self.links = Record(len(trains), len(LINK_COLUMNS))
@@ -104,10 +133,12 @@ class Recording:
     @property
     def missing_ticks(self) -> int:
         """Ticks of which any figure has not arrived; 0 when nothing is lost."""
-        parts = (self.state, self.links, *self.estimates)
+        parts = [self.state, self.links, *self.estimates]
+        parts += [self.strikes] if self.threatened else []
         if not self.trains:
             return 0
         gaps = [np.isnan(part.upto(self.ticks)[:, :, 0]).any(axis=1) for part in parts]
+        gaps.append(np.array([not self.reports.have(tick) for tick in range(self.ticks)], bool))
         return int(np.count_nonzero(np.logical_or.reduce(gaps)))
 
     def digest(self) -> str:

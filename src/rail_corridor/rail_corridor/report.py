@@ -16,6 +16,7 @@ from .metrics import train_metrics
 from .observer import Observer
 from .plan import Plan
 from .scenario import Scenario
+from .threat_metrics import threat_metrics
 
 _MOST_EVENTS_SHOWN = 8
 
@@ -44,6 +45,7 @@ def make_report(
         if recording.cbtc:
             section |= cbtc_metrics(scenario, recording, index)
         trains[name] = section
+    threats = {"threats": threat_metrics(recording)} if recording.threatened else {}
     return {
         "scenario": plan.scenario,
         "seed": plan.seed,
@@ -58,6 +60,7 @@ def make_report(
         "digest": recording.digest(),
         "failures": observer.failures,
         "events": [event for event in observer.events if event["level"] != "ok"],
+        **threats,
         "trains": trains,
     }
 
@@ -88,6 +91,7 @@ def print_report(report: dict[str, Any], console: Console) -> None:
     console.print(table)
     _print_codes(report["trains"], console)
     _print_authorities(report["trains"], console)
+    _print_threats(report, console)
     factor = report["real_time_factor"]
     speed = f"{factor:.1f} times real time, " if factor else ""
     console.print(
@@ -168,6 +172,24 @@ def _print_authorities(trains: dict[str, Any], console: Console) -> None:
             "-" if margin_m is None else f"{margin_m:.0f}",
         )
     console.print(table)
+
+
+def _print_threats(report: dict[str, Any], console: Console) -> None:
+    """Show what an intruder on the network did, and what came of it."""
+    if "threats" not in report:
+        return
+    threats = report["threats"]
+    strikes = ", ".join(f"{name} {count}" for name, count in threats["strikes"].items())
+    links = [train["cbtc"] for train in report["trains"].values()]
+    rejected = sum(link["rejected"] for link in links)
+    authorities = sum(link["forged_accepted"] for link in links)
+    reports = sum(link["forged_reports"] for link in links)
+    console.print(
+        f"threats to {threats['frames']} frames: {strikes}; {rejected} rejected, forged and taken:"
+        f" {authorities} authorities, {reports} reports",
+        soft_wrap=True,
+        highlight=False,
+    )
 
 
 def _print_events(events: list[dict[str, Any]], console: Console) -> None:

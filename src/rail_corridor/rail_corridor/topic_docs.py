@@ -22,6 +22,7 @@ from rail_wayside.cbtc_base_station_node import CbtcBaseStationParameters
 from rail_wayside.track_code_transmitter_node import TrackCodeTransmitterParameters
 from rail_wayside.wrs_node import WrsParameters
 from rail_wayside.zone_controller_node import ZoneControllerParameters
+from rail_world.backbone_node import BackboneParameters
 from rail_world.cbtc_medium_node import CbtcMediumParameters
 from rail_world.radio_medium_node import RadioMediumParameters
 from rail_world.rail_medium_node import RailMediumParameters
@@ -39,6 +40,7 @@ PARAMETERS: dict[str, Any] = {
     "track_code_receiver": TrackCodeReceiverParameters,
     "code_supervision": CodeSupervisionParameters,
     "cbtc_medium": CbtcMediumParameters,
+    "backbone": BackboneParameters,
     "cbtc_base_station": CbtcBaseStationParameters,
     "cbtc_radio": CbtcRadioParameters,
     "atp": AtpParameters,

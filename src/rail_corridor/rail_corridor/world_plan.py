@@ -17,7 +17,7 @@ from rail_world.radio_description import (
 from rail_world.rail_description import Harmonic, RailDescription, RailFault, TrackCircuit
 from rail_world.world_file import TrainStop, WorldFile
 
-from .cbtc_plan import cbtc_description
+from .cbtc_plan import cbtc_description, threat_periods
 from .fault_sections import DeadStation, DeadTransmitter, Jam, Sanding
 from .fault_sections import TrainStop as TrainStopFault
 from .layout import Layout, Zone
@@ -106,6 +106,7 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
         radio=radio,
         rails=rails_of(scenario),
         cbtc=cbtc_description(scenario),
+        threats=threat_periods(scenario),
         stops=tuple(
             TrainStop(train=fault.train, from_s=fault.from_s, to_s=fault.to_s)
             for fault in scenario.faults

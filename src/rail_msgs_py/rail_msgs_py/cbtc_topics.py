@@ -12,6 +12,9 @@ from rail_msgs_py.telegrams import Telegrams
 from rail_msgs_py.topic import Topic
 from rail_msgs_py.waveform import Waveform
 
+BACKBONE: Final = "/world/backbone"
+"""Full name of the node that carries the telegrams where the scenario threatens them."""
+
 CBTC_BASE_TX: Final = Topic(
     "/wayside/{base}/cbtc/downlink",
     Float64MultiArray,
@@ -54,7 +57,7 @@ DOWN_TELEGRAMS: Final = Topic(
     STREAM,
     Telegrams,
     "zone_controller",
-    "cbtc_base_station",
+    "cbtc_base_station or backbone",
     "Frames for the trains of a base station, sent in the next tick.",
 )
 UP_TELEGRAMS: Final = Topic(
@@ -63,8 +66,36 @@ UP_TELEGRAMS: Final = Topic(
     STREAM,
     Telegrams,
     "cbtc_base_station",
-    "zone_controller",
+    "zone_controller or backbone",
     "Frames that the base station has received in the tick.",
+)
+BACKBONE_DOWN: Final = Topic(
+    "/world/backbone/{base}/downlink_telegrams",
+    UInt8MultiArray,
+    STREAM,
+    Telegrams,
+    "backbone",
+    "cbtc_base_station",
+    "What the network makes of the frames for the trains of a base station; it sends them in the "
+    "next tick.",
+)
+BACKBONE_UP: Final = Topic(
+    "/world/backbone/{base}/uplink_telegrams",
+    UInt8MultiArray,
+    STREAM,
+    Telegrams,
+    "backbone",
+    "zone_controller",
+    "What the network makes of the frames that the base station has received in the tick.",
+)
+STRIKES: Final = Topic(
+    "/world/backbone/strikes",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "backbone",
+    "the report",
+    "The truth of the network: frames carried so far, and how often each threat has struck.",
 )
 TRAIN_TELEGRAMS: Final = Topic(
     "/{train}/atp/telegrams",
@@ -112,6 +143,15 @@ ATP_STATE: Final = Topic(
     "people, the report",
     "Where the train believes its front to be, its authority and how old that is, and counts of "
     "frames accepted, lost and rejected.",
+)
+REPORTS: Final = Topic(
+    "/wayside/zone_controller/{train}/reports",
+    Float64MultiArray,
+    ESTIMATE,
+    Table,
+    "zone_controller",
+    "people, the report",
+    "The location reports taken from a train in the tick, one row each, in their order.",
 )
 AUTHORITY: Final = Topic(
     "/wayside/zone_controller/{train}/authority",

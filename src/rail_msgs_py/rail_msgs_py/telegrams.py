@@ -97,6 +97,10 @@ class Telegrams:
         """Frames of one slot."""
         return [frame for each, frame in self.frames if each == slot]
 
+    def newest(self, slots: int) -> dict[int, bytes]:
+        """The last frame of each slot from 1 to ``slots``; others are left out."""
+        return {slot: frame for slot, frame in self.frames if 1 <= slot <= slots}
+
 
 def telegrams(stamp_ns: int, frames: Iterable[tuple[int, bytes]] = ()) -> bytes:
     """Serialised telegrams of a tick."""

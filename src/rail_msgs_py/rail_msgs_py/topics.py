@@ -18,6 +18,8 @@ from visualization_msgs.msg import MarkerArray
 from rail_msgs_py.cbtc_topics import (
     ATP_STATE,
     AUTHORITY,
+    BACKBONE_DOWN,
+    BACKBONE_UP,
     CBTC_BASE_RX,
     CBTC_BASE_TX,
     CBTC_LINKS,
@@ -26,6 +28,8 @@ from rail_msgs_py.cbtc_topics import (
     DOWN_TELEGRAMS,
     RADIO_LINK,
     RADIO_TELEGRAMS,
+    REPORTS,
+    STRIKES,
     TRAIN_TELEGRAMS,
     UP_TELEGRAMS,
 )
@@ -42,7 +46,7 @@ CLOCK: Final = Topic(
     STREAM,
     None,
     "world",
-    "wrs, zone_controller, track_code_transmitter, cbtc_base_station, cbtc_radio",
+    "wrs, zone_controller, track_code_transmitter, cbtc_base_station, cbtc_radio, backbone",
     "Start of a tick.",
 )
 STATE: Final = Topic(
@@ -106,7 +110,7 @@ DONE: Final = Topic(
     Header,
     STREAM,
     None,
-    "radio_medium, rail_medium, cbtc_medium, zone_controller",
+    "radio_medium, rail_medium, cbtc_medium, backbone, zone_controller",
     "world",
     "The node has finished the tick of this stamp.",
 )
@@ -134,10 +138,10 @@ FAILED: Final = Topic(
     LATCHED,
     None,
     "every node that waits for others, the report for the launcher: world, radio_medium, "
-    "rail_medium, cbtc_medium, zone_controller, track_code_transmitter, cbtc_base_station, "
-    "code_supervision, cbtc_radio, atp",
-    "world, radio_medium, rail_medium, cbtc_medium, zone_controller, track_code_transmitter, "
-    "cbtc_base_station, code_supervision, cbtc_radio, atp, the report",
+    "rail_medium, cbtc_medium, backbone, zone_controller, track_code_transmitter, "
+    "cbtc_base_station, code_supervision, cbtc_radio, atp",
+    "world, radio_medium, rail_medium, cbtc_medium, backbone, zone_controller, "
+    "track_code_transmitter, cbtc_base_station, code_supervision, cbtc_radio, atp, the report",
     "A node that is not waited for any longer, and why.",
 )
 DIAGNOSTICS: Final = Topic(
@@ -291,7 +295,8 @@ ALL: Final[tuple[Topic, ...]] = (
     *(READY, FAILED, DIAGNOSTICS, WRS_TX, WRS_RX, RANGE, VRS_RX, VRS_TX, VRS_CHANNEL, POSITION),
     *(CIRCUIT_TX, CIRCUIT_RX, OCCUPANCY, CODE_SENT, CODE_RX, CODE_RECEIVED, ODOMETER, COMMAND),
     *(CBTC_BASE_TX, CBTC_BASE_RX, CBTC_TRAIN_TX, CBTC_TRAIN_RX, DOWN_TELEGRAMS, UP_TELEGRAMS),
-    *(TRAIN_TELEGRAMS, RADIO_TELEGRAMS, RADIO_LINK, CBTC_LINKS, ATP_STATE, AUTHORITY),
+    *(TRAIN_TELEGRAMS, RADIO_TELEGRAMS, RADIO_LINK, CBTC_LINKS, ATP_STATE, REPORTS, AUTHORITY),
+    *(BACKBONE_DOWN, BACKBONE_UP, STRIKES),
 )
 
 STATE_COLUMNS: Final = (
@@ -315,6 +320,16 @@ ATP_COLUMNS: Final = (
 AUTHORITY_COLUMNS: Final = (
     *("end_of_authority_m", "limit_mps", "worst_rear_m", "report_age_s"),
     *("accepted", "lost", "rejected"),
+)
+#: Where and what as ``rail_msgs_py.train_report.LocationReport``, true at the first.
+REPORT_COLUMNS: Final = (
+    *("sealed_s", "train", "segment", "offset_m", "direction", "speed_mps", "uncertainty_m"),
+    *("length_m", "integrity_confirmed", "position_valid"),
+)
+#: After the first the threats of EN 50159:2010, 4.2.
+STRIKE_COLUMNS: Final = (
+    *("frames", "repetition", "deletion", "insertion", "resequencing", "corruption", "delay"),
+    "masquerade",
 )
 COMMAND_COLUMNS: Final = ("permitted_mps", "warning", "service_brake", "emergency_brake")
 

@@ -47,6 +47,13 @@ class Given(NamedTuple):
     rejected: int
 
 
+class Taken(NamedTuple):
+    """A report taken from a train, true at `sealed_s`, the time-stamp of its frame."""
+
+    sealed_s: float
+    report: LocationReport
+
+
 class AuthorityDesk:
     """Exchanges frames with the trains of a control area.
 
@@ -79,24 +86,26 @@ class AuthorityDesk:
             for number, channel in channels.items()
         }
 
-    def receive(self, base: str, slot: int, frame: bytes, time_ns: int) -> None:
-        """Take a frame that a base station received in the slot of a train."""
+    def receive(self, base: str, slot: int, frame: bytes, time_ns: int) -> Taken | None:
+        """Take a frame that a base station received in the slot of a train; its report, if any."""
         caller = self._callers.get(slot)
         if caller is None:
-            return
+            return None
         genuine, opened = caller.channel.open(frame, time_ns)
         if genuine:
             caller.base = base
         if opened is None:
-            return
+            return None
         try:
             report = LocationReport.from_bytes(opened.payload)
         except ValueError:
             caller.channel.refuse()
-            return
-        self._block.report(slot, time_ns / NANOSECONDS - opened.age_s, report)
+            return None
+        sealed_s = time_ns / NANOSECONDS - opened.age_s
+        self._block.report(slot, sealed_s, report)
         if report.position_valid and report.front_m >= caller.leaves_at_m:
             self._block.remove(slot)
+        return Taken(sealed_s, report)
 
     def ranged(
         self, number: int, time_s: float, segment: int, position_m: float, variance_m2: float

@@ -20,6 +20,9 @@ class AuthorityParameters:
     bases: tuple[str, ...] = parameter(
         (), "base stations of the train radio; without any, no authorities are given"
     )
+    backbone: bool = parameter(
+        False, "whether the backbone brings their telegrams, instead of they themselves"
+    )
     segments: tuple[str, ...] = parameter((), "tracks, numbered from 0 in telegrams")
     segment_lengths_m: tuple[float, ...] = parameter((), "length of each track", unit="m")
     limit_counts: tuple[int, ...] = parameter((), "speed limits of each track", low=1)

@@ -1,7 +1,13 @@
 """Base station of the train radio: frames to bursts for the trains, and bursts to frames.
 
-Topics in: ``/clock``, ``/wayside/zone_controller/<base>/telegrams``, ``uplink``. Topics out:
-``downlink``, ``telegrams``.
+A train has one slot in a tick, and one frame a tick comes for it. If more come, the last one is
+sent and the others are dropped: a slot has no room to catch up, so that a queue that had once
+been filled would make every later frame late. (Ports of process data do the same: the newest
+value replaces the one before.) An intruder on the network can so displace a frame, which the ends
+count as lost, but not delay those after it.
+
+Topics in: ``/clock``, ``/wayside/zone_controller/<base>/telegrams`` or, with ``backbone``,
+``/world/backbone/<base>/downlink_telegrams``; ``uplink``. Topics out: ``downlink``, ``telegrams``.
 """
 
 from __future__ import annotations
@@ -13,6 +19,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py import topics
+from rail_msgs_py.cbtc_topics import BACKBONE
 from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import Equipment
@@ -39,6 +46,9 @@ class CbtcBaseStationParameters(TrainRadioParameters):
     downlink_channel: int = parameter(1, "its channel number", low=1)
     power_dbm: float = parameter(
         20.0, "transmit power of both antennas together", unit="dBm", low=-100.0, high=60.0
+    )
+    backbone: bool = parameter(
+        False, "whether the backbone brings the telegrams, instead of the zone controller itself"
     )
     tick_s: float = parameter(0.25, "time of a tick", unit="s", low=0.01, high=1.0)
     timeout_s: float = parameter(
@@ -73,11 +83,12 @@ class CbtcBaseStationNode(Equipment):
         self._inbox: TickInbox[Telegrams | None] = TickInbox([_CLOCK_PORT, _TELEGRAMS_PORT])
         # What is to be sent in the first tick nobody can have said.
         self._inbox.put(0, _TELEGRAMS_PORT, None)
-        owners = {_TELEGRAMS_PORT: "/wayside/zone_controller"}
+        owners = {_TELEGRAMS_PORT: BACKBONE if p.backbone else "/wayside/zone_controller"}
         self._watch = TickWatch(self, self._inbox, owners, p.timeout_s, self._advance)
         self._send = self.stream_out(topics.CBTC_BASE_TX, base=base)
         self._tell = self.stream_out(topics.UP_TELEGRAMS, base=base)
-        self.stream_in(topics.DOWN_TELEGRAMS, self._on_telegrams, base=base)
+        ordered = topics.BACKBONE_DOWN if p.backbone else topics.DOWN_TELEGRAMS
+        self.stream_in(ordered, self._on_telegrams, base=base)
         self.stream_in(topics.CBTC_BASE_RX, self._on_block, base=base)
         self.stream_in(topics.CLOCK, self._on_clock)
         self.announce_when_connected()
@@ -102,8 +113,7 @@ class CbtcBaseStationNode(Equipment):
             self._send(self._silence.at(stamp_ns))
             return
         ordered = items.get(_TELEGRAMS_PORT)
-        frames = dict(ordered.frames) if ordered else {}
-        block = self._slots.block(frames)
+        block = self._slots.block(ordered.newest(self._p.trains) if ordered else {})
         first, end = self._slots.span(BEACON_SLOT)
         block[:, first:end] = self._beacon
         block *= self._amplitude

@@ -2,21 +2,25 @@
 
 With base stations it also gives movement authorities, from reports and ranges (`AuthorityDesk`).
 
-Topics in: ``/clock``, every ``range``, every base station's ``telegrams``. Topics out:
-``~/<train>/position``, ``~/<train>/authority``, ``~/<base>/telegrams``, ``~/done``.
+Topics in: ``/clock``, every ``range``, every base station's ``telegrams`` or, with ``backbone``,
+its ``uplink_telegrams``. Topics out: ``~/<train>/position``, ``~/<train>/reports``,
+``~/<train>/authority``, ``~/<base>/telegrams``, ``~/done``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py import topics
+from rail_msgs_py.cbtc_topics import BACKBONE
 from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
@@ -28,11 +32,13 @@ from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
 from rail_msgs_py.telegrams import Telegrams, telegrams
+from rail_wayside.authority_desk import Taken
 from rail_wayside.authority_parameters import AuthorityParameters, desk_of
 from rail_wayside.zone_map import Zone, ZoneMap
 from rail_wayside.zone_tracking import NOT_HEARD, Fix, Reading, ZoneTracker
 
 _CLOCK_PORT = "clock"
+_fields = attrgetter(*topics.REPORT_COLUMNS[1:])
 
 
 @dataclass(frozen=True)
@@ -142,12 +148,17 @@ class ZoneControllerNode(CorridorNode):
         self._told_tables = {
             train: TableWriter((train,), topics.AUTHORITY_COLUMNS) for train in self._told
         }
+        self._taken = {
+            train: self.publisher(topics.REPORTS, train=train).publish for train in self._told
+        }
         self._down = {base: self.stream_out(topics.DOWN_TELEGRAMS, base=base) for base in p.bases}
+        heard = topics.BACKBONE_UP if p.backbone else topics.UP_TELEGRAMS
         for base in p.bases:
-            self.stream_in(
-                topics.UP_TELEGRAMS, lambda raw, base=base: self._on_telegrams(base, raw), base=base
-            )
-        return {_port(base): topics.UP_TELEGRAMS.owner(base=base) for base in p.bases}
+            self.stream_in(heard, lambda raw, base=base: self._on_telegrams(base, raw), base=base)
+        return {
+            _port(base): BACKBONE if p.backbone else topics.UP_TELEGRAMS.owner(base=base)
+            for base in p.bases
+        }
 
     def _on_telegrams(self, base: str, raw: bytes) -> None:
         heard = Telegrams.from_cdr(raw)
@@ -189,11 +200,15 @@ class ZoneControllerNode(CorridorNode):
         desk, p = self._desk, self._p
         if desk is None:
             return
+        taken: dict[int, list[Taken]] = {}
         for base in p.bases:
             batch = heard.get(_port(base))
             for slot, frame in batch.frames if isinstance(batch, Telegrams) else ():
-                desk.receive(base, slot, frame, stamp_ns)
+                if (report := desk.receive(base, slot, frame, stamp_ns)) is not None:
+                    taken.setdefault(slot, []).append(report)
         numbers = self._numbers
+        for train, tell in self._taken.items():
+            tell(_reports(stamp_ns, taken.get(numbers[train], ())))
         for fix in fixes:
             segment = self._segments.get(fix.track)
             if segment is not None:
@@ -237,6 +252,19 @@ class ZoneControllerNode(CorridorNode):
             f"unidentified train in {unknown}" if unknown else "every train is identified",
             stamp_ns=stamp_ns,
         )
+
+
+@cache
+def _reports_table(count: int) -> TableWriter:
+    rows = tuple(str(row) for row in range(1, count + 1))
+    return TableWriter(rows, topics.REPORT_COLUMNS)
+
+
+def _reports(stamp_ns: int, taken: Sequence[Taken]) -> bytes:
+    """Table of the reports taken from a train in a tick."""
+    figures = [(sealed_s, *_fields(report)) for sealed_s, report in taken]
+    values = np.array(figures, dtype=np.float64).reshape(len(taken), len(topics.REPORT_COLUMNS))
+    return _reports_table(len(taken)).write(stamp_ns, values)
 
 
 def _port(base: str) -> str:

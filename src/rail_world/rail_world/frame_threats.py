@@ -48,9 +48,10 @@ from rail_msgs_py.stamps import seconds_to_ns
 Link: TypeAlias = tuple[int, int]
 
 RECENT_FRAMES: Final = 16
+#: What is sent at the heels of a frame comes so much later [ns].
+AFTER_NS: Final = 1000
 _HELD_FRAMES = 3
 _FLIPPED_BITS = 8
-_AFTER_NS = 1000
 _BLOCK = 4096
 
 
@@ -123,13 +124,11 @@ class FrameThreats:
         memory: int = 1024,
     ) -> None:
         check_number("latency_s", latency_s, 0.0, 60.0)
-        check_number("longest_delay_s", longest_delay_s, 0.0, 3600.0)
         check_number("memory", memory, 1, 1 << 20)
-        self._rates = [(threat, getattr(rates, threat.value)) for threat in Threat]
+        self.act(rates, longest_delay_s)
         self._uniform: list[float] = []
         self._rng = rng
         self._latency_ns = seconds_to_ns(latency_s)
-        self._longest_ns = seconds_to_ns(longest_delay_s)
         self._memory = memory
         self._archive: list[tuple[Link, bytes, int]] = []
         self._recent: dict[Link, deque[tuple[bytes, int]]] = {}
@@ -146,6 +145,12 @@ class FrameThreats:
         )
         #: How often each threat has struck.
         self.strikes: Counter[Threat] = Counter()
+
+    def act(self, rates: ThreatRates, longest_delay_s: float) -> None:
+        """From now on strike at these rates, and delay by so much at most [s]."""
+        check_number("longest_delay_s", longest_delay_s, 0.0, 3600.0)
+        self._rates = [(threat, getattr(rates, threat.value)) for threat in Threat]
+        self._longest_ns = seconds_to_ns(longest_delay_s)
 
     def send(self, link: Link, frame: bytes, time_ns: int) -> None:
         """Take a frame of the link's sender; what it leads to comes out of `arrivals`."""
@@ -228,7 +233,7 @@ class FrameThreats:
         rest = []
         for count, frame, threat, sent_ns in held:
             if count == 1:
-                self._add(link, frame, time_ns + _AFTER_NS, threat, sent_ns)
+                self._add(link, frame, time_ns + AFTER_NS, threat, sent_ns)
             else:
                 rest.append((count - 1, frame, threat, sent_ns))
         self._held[link] = rest
@@ -250,14 +255,14 @@ class FrameThreats:
     def _repeat(self, link: Link, frame: bytes, time_ns: int) -> None:
         way = self._below(3)
         if way == 0:
-            self._add(link, frame, time_ns + _AFTER_NS, Threat.REPETITION, time_ns)
+            self._add(link, frame, time_ns + AFTER_NS, Threat.REPETITION, time_ns)
             return
         if way == 1:
             recent = self._recent[link]
             frame, sent_ns = recent[self._below(len(recent))]
         else:
             link, frame, sent_ns = self._archive[self._below(len(self._archive))]
-        self._add(link, frame, time_ns + _AFTER_NS, Threat.REPETITION, sent_ns)
+        self._add(link, frame, time_ns + AFTER_NS, Threat.REPETITION, sent_ns)
 
     def _random(self, link: Link, _frame: bytes, time_ns: int) -> None:
         self._add(link, self._rng.bytes(FRAME_BYTES), time_ns, Threat.INSERTION)
@@ -286,7 +291,7 @@ class FrameThreats:
         if foreign is None:
             self._sealed_with_another_key(link, frame, time_ns)
             return
-        self._add(link, foreign[0], time_ns + _AFTER_NS, Threat.MASQUERADE, foreign[1])
+        self._add(link, foreign[0], time_ns + AFTER_NS, Threat.MASQUERADE, foreign[1])
 
     def _readdressed(self, link: Link, frame: bytes, time_ns: int) -> None:
         foreign = self._foreign(link)
@@ -306,4 +311,4 @@ class FrameThreats:
     def _thrown_back(self, link: Link, frame: bytes, time_ns: int) -> None:
         source, destination = link
         back = (destination, source)
-        self._add(back, frame, time_ns + _AFTER_NS, Threat.MASQUERADE, time_ns)
+        self._add(back, frame, time_ns + AFTER_NS, Threat.MASQUERADE, time_ns)

@@ -11,6 +11,7 @@ from rail_world.description import JunctionDescription, TrackDescription
 from rail_world.network import Network, build_network
 from rail_world.radio_description import RadioDescription
 from rail_world.rail_description import RailDescription
+from rail_world.threat_description import ThreatPeriod
 from rail_world.train_description import TrainDescription
 
 
@@ -40,6 +41,9 @@ class WorldFile(BaseModel):
     radio: RadioDescription
     rails: RailDescription | None = None
     cbtc: CbtcDescription | None = None
+    threats: tuple[ThreatPeriod, ...] = Field(
+        (), description="what an intruder does to the frames on the backbone"
+    )
     stops: tuple[TrainStop, ...] = ()
     odometer_error: float = Field(
         0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' relative error"

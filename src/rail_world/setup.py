@@ -23,6 +23,7 @@ setup(
             "radio_medium = rail_world.radio_medium_node:main",
             "rail_medium = rail_world.rail_medium_node:main",
             "cbtc_medium = rail_world.cbtc_medium_node:main",
+            "backbone = rail_world.backbone_node:main",
         ],
     },
 )

@@ -40,6 +40,7 @@ def ros_domain() -> Iterator[int]:
 
 
 _ONLY_RUN = {
+    "test_positions_on_board",
     *("test_kill_campaign", "test_track_codes", "test_train_radio", "test_placement"),
     "test_hostile_network",
 }

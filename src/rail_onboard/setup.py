@@ -24,6 +24,8 @@ setup(
             "code_supervision = rail_onboard.code_supervision_node:main",
             "cbtc_radio = rail_onboard.cbtc_radio_node:main",
             "atp = rail_onboard.atp_node:main",
+            "doppler_positioner = rail_onboard.doppler_positioner_node:main",
+            "localizer = rail_onboard.localizer_node:main",
         ],
     },
 )

@@ -23,6 +23,7 @@ setup(
             "zone_controller = rail_wayside.zone_controller_node:main",
             "track_code_transmitter = rail_wayside.track_code_transmitter_node:main",
             "cbtc_base_station = rail_wayside.cbtc_base_station_node:main",
+            "reference_station = rail_wayside.reference_station_node:main",
         ],
     },
 )

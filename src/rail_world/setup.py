@@ -24,6 +24,7 @@ setup(
             "rail_medium = rail_world.rail_medium_node:main",
             "cbtc_medium = rail_world.cbtc_medium_node:main",
             "backbone = rail_world.backbone_node:main",
+            "reference_medium = rail_world.reference_medium_node:main",
         ],
     },
 )

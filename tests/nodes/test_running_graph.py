@@ -13,7 +13,7 @@ from rail_corridor.observer import Observer
 from rail_corridor.plan import NodeSpec, make_plan
 from rail_corridor.scenario import Overrides, load_scenario
 from rail_corridor.topic_docs import PARAMETERS, document, main, type_name
-from rail_msgs_py import cbtc_topics, topics
+from rail_msgs_py import cbtc_topics, positioning_topics, topics
 from rail_msgs_py.topic import Topic
 from rail_msgs_py.topics import ALL, kind_of
 
@@ -24,11 +24,12 @@ RAILS = [
     *(topics.CODE_SENT, topics.CODE_RX, topics.CODE_RECEIVED),
 ]
 THREATS = [topics.BACKBONE_DOWN, topics.BACKBONE_UP, topics.STRIKES]
+PLACES = [topic for topic in vars(positioning_topics).values() if isinstance(topic, Topic)]
 #: Scenarios with every kind of node between them, and the topics that each does without.
 SCENARIOS = {
-    "follow_codes": RADIO,
-    "moving_block": [*RAILS, *THREATS],
-    "hostile_network": RAILS,
+    "follow_codes": [*RADIO, *PLACES],
+    "hostile_network": [*RAILS, *PLACES],
+    "located_block": [*RAILS, *THREATS],
 }
 #: What rclpy itself offers beside the corridor's topics.
 ROS_OWN = ("/rosout", "/parameter_events")

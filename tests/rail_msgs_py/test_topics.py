@@ -33,6 +33,7 @@ PARTS = {
     "track": ("main", "markers", "path"),
     "channel": (1, 42),
     "base": ("base1", "wrs1", "b"),
+    "station": ("ref1", "wrs1", "r"),
     "supervision": ("atp", "code_supervision"),
     "node": ("/world/radio_medium", "/wayside/zone_controller"),
 }

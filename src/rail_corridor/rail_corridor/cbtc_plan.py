@@ -33,7 +33,7 @@ SIGMAS = 4.0
 #: How far authorities reach past the end of a track whose trains go on.
 _BEYOND_M = 2000.0
 #: What the dispatcher knows of where a train is when it is put into service [m].
-_PLACED_M = 1.0
+PLACED_M = 1.0
 
 
 def cbtc_description(scenario: Scenario) -> CbtcDescription | None:
@@ -194,7 +194,7 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
         "number": number,
         "segment": list(scenario.network.tracks).index(train.route[0]),
         "start_m": train.start_m,
-        "placed_m": _PLACED_M,
+        "placed_m": PLACED_M,
         "length_m": train.vehicle.length_m,
         "steepest_fall_permil": steepest_fall_permil(track),
         "braking_mps2": plan.braking_mps2,
@@ -202,6 +202,7 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
         "traction_mps2": Vehicle(train.vehicle).traction_mps2(0.0),
         "odometer_error": SIGMAS * plan.odometer_error,
         "authority_timeout_s": plan.timeout_s,
+        "localizer": scenario.localizer is not None,
         "secret": secret(scenario),
         "seed": scenario.seed,
         "tick_s": scenario.tick_s,
@@ -242,7 +243,7 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
             tracks[train.route[0]].length_m if train.leaves_on_arrival else 0.0
             for train in by_departure
         ),
-        "placed_m": _PLACED_M,
+        "placed_m": PLACED_M,
         "margin_m": plan.margin_m,
         "validity_s": plan.timeout_s,
         "fix_sigmas": SIGMAS,

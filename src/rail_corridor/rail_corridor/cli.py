@@ -13,6 +13,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import typer
 
+from .study_commands import add_to as add_studies
+from .usage import ScenarioArgument, TrackOption, UsageError, check_choice, check_writable
+
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
@@ -20,18 +23,11 @@ app = typer.Typer(
     help="A railway signalling corridor on ROS 2, at waveform level.",
 )
 
-ScenarioArgument = Annotated[
-    str, typer.Argument(help="Name of a built-in scenario, or a YAML file.", metavar="SCENARIO")
-]
 SeedOption = Annotated[
     int | None, typer.Option("--seed", help="Seed of every random draw.", metavar="N")
 ]
 DurationOption = Annotated[
     float | None, typer.Option("--duration", help="Simulated time [s].", metavar="S")
-]
-TrackOption = Annotated[
-    Path | None,
-    typer.Option("--track", help="TTOBench file that replaces the first track.", metavar="FILE"),
 ]
 TrainsOption = Annotated[
     int | None, typer.Option("--trains", help="Number of trains.", metavar="N")
@@ -40,10 +36,6 @@ ZoneOption = Annotated[
     float | None,
     typer.Option("--zone-length", help="No zone longer than this [m].", metavar="M"),
 ]
-
-
-class UsageError(Exception):
-    """Wrong use of a command; one line."""
 
 
 def _load(
@@ -60,11 +52,6 @@ def _load(
         seed=seed, duration_s=duration, track=track, trains=trains, zone_length_m=zone_length
     )
     return load_scenario(scenario, overrides=overrides)
-
-
-def _choice(option: str, value: str | None, choices: tuple[str, ...]) -> None:
-    if value is not None and value not in choices:
-        raise UsageError(f"{option}: {value!r}: must be one of {', '.join(choices)}")
 
 
 @app.command()
@@ -125,14 +112,14 @@ def run(
     """Run a corridor, and report."""
     import math
 
-    _choice("--processes", processes, ("one", "site", "node"))
-    _choice("--only", only, ("wayside", "onboard"))
+    check_choice("--processes", processes, ("one", "site", "node"))
+    check_choice("--only", only, ("wayside", "onboard"))
     if not (math.isfinite(rate) and 0.0 <= rate <= 1e6):
         raise UsageError(f"--rate: {rate}: must be from 0 to 1e6")
     if not (math.isfinite(timeout) and 0.5 <= timeout <= 3600.0):
         raise UsageError(f"--timeout: {timeout}: must be from 0.5 to 3600 s")
     if report is not None:
-        _check_writable("--report", report)
+        check_writable("--report", report)
     from .kills import parse_kill
 
     kills = tuple(parse_kill(text) for text in kill or ())
@@ -147,15 +134,6 @@ def run(
         rate, processes, only, report, timeout, tuple(external or ()), kills
     )
     raise typer.Exit(run_corridor(loaded, options, Console()))  # type: ignore[arg-type]
-
-
-def _check_writable(option: str, path: Path) -> None:
-    if path.is_dir():
-        raise UsageError(f"{option}: {path}: is a directory")
-    if not path.absolute().parent.is_dir():
-        raise UsageError(f"{option}: {path}: there is no such directory")
-    if not os.access(path.absolute().parent, os.W_OK):
-        raise UsageError(f"{option}: {path}: cannot be written")
 
 
 @app.command()
@@ -231,10 +209,10 @@ def figures(
     from .figures import FIGURES, draw
 
     for name in only or ():
-        _choice("--only", name, tuple(FIGURES))
+        check_choice("--only", name, tuple(FIGURES))
     if directory.exists() and not directory.is_dir():
         raise UsageError(f"OUTDIR: {directory}: is not a directory")
-    _check_writable("OUTDIR", directory / "any")
+    check_writable("OUTDIR", directory / "any")
     for path in draw(directory, tuple(only or ())):
         typer.echo(path)
 
@@ -250,102 +228,13 @@ def bench(
 ) -> None:
     """Run the benchmarks: every ratio is measured side by side in one run."""
     if json is not None:
-        _check_writable("--json", json)
+        check_writable("--json", json)
     from .bench import run_benchmarks
 
     raise typer.Exit(run_benchmarks(tuple(names or ()), json))
 
 
-@app.command()
-def campaign(
-    what: Annotated[
-        str,
-        typer.Argument(help="What to put to the test: handover, threats, kills.", metavar="WHAT"),
-    ],
-    crossings: Annotated[
-        int, typer.Option("--crossings", help="handover: at least so many each.", metavar="N")
-    ] = 200,
-    runs: Annotated[
-        int, typer.Option("--runs", help="kills: runs, of one seed each.", metavar="N")
-    ] = 100,
-    frames: Annotated[
-        int, typer.Option("--frames", help="threats: frames under each.", metavar="N")
-    ] = 100_000,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the first run.", metavar="N")] = 1,
-    json: Annotated[
-        Path | None, typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
-    ] = None,
-) -> None:
-    """Run many generated scenarios and count what must not happen; exit code 1 if it did."""
-    _choice("WHAT", what, ("handover", "threats", "kills"))
-    if not 1 <= frames <= 100_000_000:
-        raise UsageError(f"--frames: {frames}: must be from 1 to 100000000")
-    if not 1 <= runs <= 1_000_000:
-        raise UsageError(f"--runs: {runs}: must be from 1 to 1000000")
-    if not 1 <= crossings <= 1_000_000:
-        raise UsageError(f"--crossings: {crossings}: must be from 1 to 1000000")
-    if not 0 <= seed < 2**62:
-        raise UsageError(f"--seed: {seed}: must be from 0 to 2**62")
-    if json is not None:
-        _check_writable("--json", json)
-
-    from rich.console import Console
-
-    from .campaign import Row, print_rows, run_campaign, write_rows
-    from .campaign_scenarios import situations
-    from .child_run import RunFailedError
-
-    console = Console()
-    if what == "kills":
-        from .kill_campaign import kill_campaign
-
-        raise typer.Exit(kill_campaign(runs, seed, console, json))
-    if what == "threats":
-        from .threat_table import threat_campaign
-
-        raise typer.Exit(threat_campaign(frames, seed, console, json))
-    rows: list[Row] = []
-    try:
-        rows.extend(run_campaign(situations(), crossings, seed, console))
-    except KeyboardInterrupt:
-        print_rows(rows, console)  # what is done is worth seeing
-        raise
-    except RunFailedError as error:
-        print(f"rail: {error}", file=sys.stderr)
-        raise typer.Exit(1) from None
-    print_rows(rows, console)
-    if json is not None:
-        write_rows(rows, json)
-    raise typer.Exit(1 if any(row.violations for row in rows) else 0)
-
-
-@app.command()
-def sweep(
-    what: Annotated[str, typer.Argument(help="What to vary: link_margin.", metavar="WHAT")],
-    out: Annotated[
-        Path, typer.Option("--out", help="Folder for picture and figures.", metavar="DIR")
-    ] = Path("link_margin"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points.")] = False,
-    seeds: Annotated[
-        int, typer.Option("--seeds", help="Runs of each point.", metavar="N", min=1, max=100)
-    ] = 1,
-) -> None:
-    """Run one situation over a range of parameters: a table, a picture, and JSON."""
-    _choice("WHAT", what, ("link_margin",))
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"--out: {out}: is not a directory")
-    _check_writable("--out", (out if out.is_dir() else out.parent) / "any")
-
-    from rich.console import Console
-
-    from .child_run import RunFailedError
-    from .link_margin import run_link_margin
-
-    try:
-        run_link_margin(out, quick, Console(), seeds)
-    except RunFailedError as error:
-        print(f"rail: {error}", file=sys.stderr)
-        raise typer.Exit(1) from None
+add_studies(app)
 
 
 def main() -> None:

@@ -86,7 +86,39 @@ class NetworkThreats(_Fault):
     )
 
 
+class DeadReference(_Fault):
+    """A reference station that sends nothing."""
+
+    kind: Literal["dead_reference"]
+    station: Name = Field(description="its name: ref1, ref2, ... in the order of the tracks")
+
+
+class DetunedReference(_Fault):
+    """A reference station whose oscillator is off."""
+
+    kind: Literal["detuned_reference"]
+    station: Name = Field(description="its name: ref1, ref2, ... in the order of the tracks")
+    shift_hz: Number = Field(ge=-2000.0, le=2000.0, description="how far it is off [Hz]")
+
+
+class WheelSlip(_Fault):
+    """Wheels that turn faster or slower than the train runs."""
+
+    kind: Literal["wheel_slip"]
+    train: Name = Field(description="the train")
+    ratio: Number = Field(ge=0.0, le=3.0, description="speed of the wheels over that of the train")
+
+
 Fault = Annotated[
-    DeadStation | Jam | Sanding | DeadTransmitter | DeadBaseStation | TrainStop | NetworkThreats,
+    DeadStation
+    | Jam
+    | Sanding
+    | DeadTransmitter
+    | DeadBaseStation
+    | TrainStop
+    | NetworkThreats
+    | DeadReference
+    | DetunedReference
+    | WheelSlip,
     Field(discriminator="kind"),
 ]

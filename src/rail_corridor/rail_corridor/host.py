@@ -31,11 +31,16 @@ NODE_CLASSES = {
     "cbtc_base_station": ("rail_wayside.cbtc_base_station_node", "CbtcBaseStationNode"),
     "cbtc_radio": ("rail_onboard.cbtc_radio_node", "CbtcRadioNode"),
     "atp": ("rail_onboard.atp_node", "AtpNode"),
+    "reference_medium": ("rail_world.reference_medium_node", "ReferenceMediumNode"),
+    "reference_station": ("rail_wayside.reference_station_node", "ReferenceStationNode"),
+    "doppler_positioner": ("rail_onboard.doppler_positioner_node", "DopplerPositionerNode"),
+    "localizer": ("rail_onboard.localizer_node", "LocalizerNode"),
 }
 #: Kinds whose name is a parameter of the scenario rather than of the class.
 _NAMED = {
     *("wrs", "vrs", "track_code_transmitter", "track_code_receiver", "code_supervision"),
-    *("cbtc_base_station", "cbtc_radio", "atp"),
+    *("cbtc_base_station", "cbtc_radio", "atp", "reference_station"),
+    *("doppler_positioner", "localizer"),
 }
 #: With more nodes than this in a process the parameter services are left out.
 MOST_NODES_WITH_SERVICES = 12

@@ -70,6 +70,8 @@ class Observer(CorridorNode):
             circuits,
             cbtc=plan.world.cbtc is not None,
             threatened=bool(plan.world.threats),
+            references=plan.world.references is not None,
+            localizer=any(spec.kind == "localizer" for spec in plan.nodes),
         )
         self._width = 2 + channels
         self.failures: list[dict[str, Any]] = []
@@ -94,6 +96,7 @@ class Observer(CorridorNode):
                 )
             self._listen_to_codes()
             self._listen_to_authorities()
+            self._listen_to_positions()
         self.every(0.1, on_progress)
         self.announce_when_connected()
 
@@ -156,6 +159,14 @@ class Observer(CorridorNode):
             self.recording.reports.put(table.stamp_ns // self._tick_ns, index, table.values)
 
         self.stream_in(topics.REPORTS, put, train=train)
+
+    def _listen_to_positions(self) -> None:
+        recording = self.recording
+        for index, train in enumerate(recording.trains):
+            if recording.references:
+                self._record(recording.doppler, topics.DOPPLER_FIX, index, train=train)
+            if recording.localizer:
+                self._record(recording.located, topics.LOCALIZER_STATE, index, train=train)
 
     def _record_command(self, index: int, train: str, supervision: str) -> None:
         command = self.recording.command

@@ -28,6 +28,8 @@ class Overrides:
         Number of trains: that many of a timetable, or the first ones of a list.
     zone_length_m : float, optional
         Automatic placing of stations with this zone length [m].
+    reference_spacing_m, reference_offset_m : float, optional
+        Reference stations so far apart and off the track [m].
     """
 
     seed: int | None = None
@@ -35,6 +37,8 @@ class Overrides:
     track: str | Path | None = None
     trains: int | None = None
     zone_length_m: float | None = None
+    reference_spacing_m: float | None = None
+    reference_offset_m: float | None = None
 
 
 _OPTIONS: Final[Mapping[str, str]] = {
@@ -43,6 +47,8 @@ _OPTIONS: Final[Mapping[str, str]] = {
     "track": "--track",
     "trains": "--trains",
     "zone_length_m": "--zone-length",
+    "reference_spacing_m": "--spacing",
+    "reference_offset_m": "--offset",
 }
 
 
@@ -71,6 +77,12 @@ def apply_overrides(data: dict[str, Any], overrides: Overrides) -> dict[str, str
             "zone_length_m": overrides.zone_length_m,
         }
         origins["stations.zone_length_m"] = "zone_length_m"
+    for name, field in (("reference_spacing_m", "spacing_m"), ("reference_offset_m", "offset_m")):
+        value = getattr(overrides, name)
+        if value is not None:
+            plan = data.get("references")
+            data["references"] = {**(plan if isinstance(plan, dict) else {}), field: value}
+            origins[f"references.{field}"] = name
     if overrides.trains is not None:
         _apply_train_count(data, overrides.trains)
         origins["timetable.count"] = "trains"

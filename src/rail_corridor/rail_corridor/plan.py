@@ -20,6 +20,7 @@ from .code_plan import code_nodes
 from .errors import InputError
 from .layout import Layout
 from .node_spec import NodeSpec, Side
+from .positioning_plan import positioning_nodes
 from .scenario import Scenario
 from .world_plan import survey, world_file
 
@@ -131,10 +132,14 @@ def make_plan(
     more = [
         *code_nodes(scenario, str(world_path), timeout_s),
         *cbtc_nodes(scenario, str(world_path), timeout_s),
+        *positioning_nodes(scenario, str(world_path), timeout_s),
     ]
     others = [medium, controller, *equipment, *more]
     sinks = [MEDIUM, CONTROLLER, *(spec.name for spec in more if spec.side == "world")]
-    clocked = {"wrs", "track_code_transmitter", "cbtc_base_station", "cbtc_radio", "backbone"}
+    clocked = {
+        *("wrs", "track_code_transmitter", "cbtc_base_station", "cbtc_radio", "backbone"),
+        "reference_station",
+    }
     supervision = scenario.supervision
     parameters = {
         "world_file": str(world_path),
@@ -146,6 +151,7 @@ def make_plan(
             {CONTROLLER, *(spec.name for spec in others if spec.kind in clocked)} - {*external}
         ),
         "supervised": tuple(scenario.supervised),
+        "odometers": scenario.with_odometer,
         "supervision": supervision.node if supervision else "",
         "cab_signals": supervision is None or supervision.cab_signals,
         "observed": observed,

@@ -73,6 +73,8 @@ class Recording:
         Whether trains obey authorities received by radio.
     threatened : bool
         Whether a backbone with threats carries their telegrams.
+    references, localizer : bool
+        Whether trains find their place by Doppler shifts, and from all sensors.
     """
 
     def __init__(
@@ -84,13 +86,17 @@ class Recording:
         *,
         cbtc: bool = False,
         threatened: bool = False,
+        references: bool = False,
+        localizer: bool = False,
     ) -> None:
         from rail_msgs_py.topics import (
             ATP_COLUMNS,
             AUTHORITY_COLUMNS,
             CBTC_LINK_COLUMNS,
             COMMAND_COLUMNS,
+            DOPPLER_COLUMNS,
             LINK_COLUMNS,
+            LOCALIZER_COLUMNS,
             RADIO_COLUMNS,
             RECEIVED_COLUMNS,
             SENT_COLUMNS,
@@ -112,6 +118,9 @@ class Recording:
         self.threatened = threatened
         self.strikes = Record(1, len(STRIKE_COLUMNS))
         self.cbtc_links = Record(len(trains), len(CBTC_LINK_COLUMNS))
+        self.references, self.localizer = references, localizer
+        self.doppler = Record(len(trains), len(DOPPLER_COLUMNS))
+        self.located = Record(len(trains), len(LOCALIZER_COLUMNS))
         self.state = Record(len(trains), len(STATE_COLUMNS))
         self.links = Record(len(trains), len(LINK_COLUMNS))
         self.channel = Record(len(trains), 2 + channels)
@@ -125,10 +134,16 @@ class Recording:
     @property
     def estimates(self) -> tuple[Record, ...]:
         """What the equipment on the trains and for them has made out."""
-        ranging = (self.position, self.channel)
+        records = [self.position, self.channel]
         if self.cbtc:
-            return (*ranging, self.radio, self.atp, self.authority, self.command)
-        return (*ranging, self.received, self.command) if self.circuits else ranging
+            records += [self.radio, self.atp, self.authority, self.command]
+        elif self.circuits:
+            records += [self.received, self.command]
+        if self.references:
+            records.append(self.doppler)
+        if self.localizer:
+            records.append(self.located)
+        return tuple(records)
 
     @property
     def missing_ticks(self) -> int:

@@ -15,6 +15,7 @@ from .code_metrics import code_metrics
 from .metrics import train_metrics
 from .observer import Observer
 from .plan import Plan
+from .positioning_metrics import positioning_metrics
 from .scenario import Scenario
 from .threat_metrics import threat_metrics
 
@@ -44,6 +45,7 @@ def make_report(
             section |= code_metrics(scenario, recording, index)
         if recording.cbtc:
             section |= cbtc_metrics(scenario, recording, index)
+        section |= positioning_metrics(recording, index)
         trains[name] = section
     threats = {"threats": threat_metrics(recording)} if recording.threatened else {}
     return {
@@ -92,6 +94,7 @@ def print_report(report: dict[str, Any], console: Console) -> None:
     _print_codes(report["trains"], console)
     _print_authorities(report["trains"], console)
     _print_threats(report, console)
+    _print_positions(report["trains"], console)
     factor = report["real_time_factor"]
     speed = f"{factor:.1f} times real time, " if factor else ""
     console.print(
@@ -190,6 +193,32 @@ def _print_threats(report: dict[str, Any], console: Console) -> None:
         soft_wrap=True,
         highlight=False,
     )
+
+
+def _print_positions(trains: dict[str, Any], console: Console) -> None:
+    """Show what trains found out about their place by themselves."""
+    title = "positions on board"
+    table = Table(title=title, title_justify="left", title_style="bold")
+    headings = ("train", "by", "known", "RMSE m", "95 % m", "max m", "level m", "over")
+    for heading in headings:
+        left = heading in ("train", "by")
+        table.add_column(heading, justify="left" if left else "right", no_wrap=True)
+    for name, train in trains.items():
+        for key, label in (("doppler", "Doppler"), ("localizer", "all sensors")):
+            if key not in train:
+                continue
+            found = train[key]
+            level_m = found.get("protection_level_m")
+            table.add_row(
+                name,
+                label,
+                _percent(found["availability"]),
+                *(_metres(found[column]) for column in ("rmse_m", "p95_m", "max_m")),
+                "" if level_m is None else f"{level_m:.1f}",
+                str(found.get("exceeded", "")),
+            )
+    if table.row_count:
+        console.print(table)
 
 
 def _print_events(events: list[dict[str, Any]], console: Console) -> None:

@@ -28,6 +28,8 @@ from .errors import InputError, from_validation
 from .fault_sections import Fault
 from .layout import Layout, place_stations
 from .overrides import Overrides, apply_overrides, blame_override
+from .positioning_section import LocalizerPlan, ReferencePlan
+from .reference_stations import Reference, place_references
 from .scenario_checks import check_scenario
 from .section_fields import Whole
 from .sections import (
@@ -80,6 +82,12 @@ class Scenario(Description):
     cbtc: CbtcPlan | None = Field(
         default=None, description="train control by radio, which trains obey; null = none"
     )
+    references: ReferencePlan | None = Field(
+        default=None, description="stations for positions by Doppler shifts; null = none"
+    )
+    localizer: LocalizerPlan | None = Field(
+        default=None, description="position on board from all sensors; null = none"
+    )
     trains: tuple[TrainDescription, ...] = Field(
         default=(), max_length=100, description="trains one by one"
     )
@@ -129,6 +137,24 @@ class Scenario(Description):
     def bases(self) -> tuple[Base, ...]:
         """Base stations of the train radio in the order of the tracks; none without a plan."""
         return () if self.cbtc is None else place_bases(self.network, self.cbtc)
+
+    @cached_property
+    def reference_stations(self) -> tuple[Reference, ...]:
+        """Reference stations in the order of the tracks; none without a plan."""
+        return () if self.references is None else place_references(self.network, self.references)
+
+    @property
+    def odometer_error(self) -> float:
+        """Standard deviation of the wheels' error; 0 where nobody listens to them."""
+        if self.supervision is not None:
+            return self.supervision.odometer_error
+        return 0.0 if self.localizer is None else self.localizer.odometer_error
+
+    @property
+    def with_odometer(self) -> tuple[str, ...]:
+        """Trains whose wheels are listened to."""
+        listened = self.supervision is not None or self.localizer is not None
+        return tuple(train.name for train in self.trains) if listened else ()
 
     @property
     def supervision(self) -> Supervision | None:

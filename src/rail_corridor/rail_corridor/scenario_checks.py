@@ -16,6 +16,7 @@ from .code_checks import check_codes
 from .errors import InputError, from_world
 from .fault_sections import DeadStation, Jam
 from .layout import Layout
+from .positioning_checks import check_positioning
 from .sections import LONGEST_ZONE_M, StationPlan
 from .timetable import CLEARING_TIME_S
 
@@ -66,6 +67,7 @@ def check_scenario(scenario: Scenario, train_fields: Sequence[str]) -> None:
     _check_faults(scenario, layout)
     check_codes(scenario, train_fields)
     check_cbtc(scenario, train_fields)
+    check_positioning(scenario, train_fields)
 
 
 def _check_zone_lengths(scenario: Scenario, layout: Layout) -> None:

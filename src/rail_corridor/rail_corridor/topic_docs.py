@@ -16,9 +16,12 @@ from rail_msgs_py.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, n
 from rail_onboard.atp_node import AtpParameters
 from rail_onboard.cbtc_radio_node import CbtcRadioParameters
 from rail_onboard.code_supervision_node import CodeSupervisionParameters
+from rail_onboard.doppler_positioner_node import DopplerPositionerParameters
+from rail_onboard.localizer_node import LocalizerParameters
 from rail_onboard.track_code_receiver_node import TrackCodeReceiverParameters
 from rail_onboard.vrs_node import VrsParameters
 from rail_wayside.cbtc_base_station_node import CbtcBaseStationParameters
+from rail_wayside.reference_station_node import ReferenceStationParameters
 from rail_wayside.track_code_transmitter_node import TrackCodeTransmitterParameters
 from rail_wayside.wrs_node import WrsParameters
 from rail_wayside.zone_controller_node import ZoneControllerParameters
@@ -26,6 +29,7 @@ from rail_world.backbone_node import BackboneParameters
 from rail_world.cbtc_medium_node import CbtcMediumParameters
 from rail_world.radio_medium_node import RadioMediumParameters
 from rail_world.rail_medium_node import RailMediumParameters
+from rail_world.reference_medium_node import ReferenceMediumParameters
 from rail_world.world_node import WorldParameters
 
 #: Kind of node, as in `rail_corridor.host.NODE_CLASSES`, and its parameters.
@@ -44,6 +48,10 @@ PARAMETERS: dict[str, Any] = {
     "cbtc_base_station": CbtcBaseStationParameters,
     "cbtc_radio": CbtcRadioParameters,
     "atp": AtpParameters,
+    "reference_medium": ReferenceMediumParameters,
+    "reference_station": ReferenceStationParameters,
+    "doppler_positioner": DopplerPositionerParameters,
+    "localizer": LocalizerParameters,
 }
 
 _INTRODUCTION = """\

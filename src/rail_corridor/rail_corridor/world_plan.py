@@ -15,12 +15,14 @@ from rail_world.radio_description import (
     StationAntenna,
 )
 from rail_world.rail_description import Harmonic, RailDescription, RailFault, TrackCircuit
-from rail_world.world_file import TrainStop, WorldFile
+from rail_world.world_file import TrainStop, WheelSlip, WorldFile
 
 from .cbtc_plan import cbtc_description, threat_periods
 from .fault_sections import DeadStation, DeadTransmitter, Jam, Sanding
 from .fault_sections import TrainStop as TrainStopFault
+from .fault_sections import WheelSlip as WheelSlipFault
 from .layout import Layout, Zone
+from .positioning_plan import reference_description
 from .scenario import Scenario
 
 #: Antennas of a branching station look this far outward, so that their levels part at once.
@@ -96,7 +98,6 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
             if isinstance(fault, DeadStation | Jam)
         ),
     )
-    supervision = scenario.supervision
     return WorldFile(
         seed=scenario.seed,
         tick_s=scenario.tick_s,
@@ -107,12 +108,18 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
         rails=rails_of(scenario),
         cbtc=cbtc_description(scenario),
         threats=threat_periods(scenario),
+        references=reference_description(scenario),
         stops=tuple(
             TrainStop(train=fault.train, from_s=fault.from_s, to_s=fault.to_s)
             for fault in scenario.faults
             if isinstance(fault, TrainStopFault)
         ),
-        odometer_error=0.0 if supervision is None else supervision.odometer_error,
+        slips=tuple(
+            WheelSlip(train=fault.train, from_s=fault.from_s, to_s=fault.to_s, ratio=fault.ratio)
+            for fault in scenario.faults
+            if isinstance(fault, WheelSlipFault)
+        ),
+        odometer_error=scenario.odometer_error,
     )
 
 

@@ -34,6 +34,15 @@ from rail_msgs_py.cbtc_topics import (
     UP_TELEGRAMS,
 )
 from rail_msgs_py.position import Position
+from rail_msgs_py.positioning_topics import (
+    DOPPLER_FIX,
+    DOPPLER_POSITION,
+    LOCALIZER_POSITION,
+    LOCALIZER_STATE,
+    REFERENCE_RX,
+    REFERENCE_TX,
+    TOLD_POSITION,
+)
 from rail_msgs_py.qos import ESTIMATE, LATCHED, STREAM
 from rail_msgs_py.range_reading import RangeReading
 from rail_msgs_py.table import Table
@@ -46,7 +55,8 @@ CLOCK: Final = Topic(
     STREAM,
     None,
     "world",
-    "wrs, zone_controller, track_code_transmitter, cbtc_base_station, cbtc_radio, backbone",
+    "wrs, zone_controller, track_code_transmitter, cbtc_base_station, cbtc_radio, backbone, "
+    "reference_station",
     "Start of a tick.",
 )
 STATE: Final = Topic(
@@ -55,7 +65,7 @@ STATE: Final = Topic(
     ESTIMATE,
     Table,
     "world",
-    "radio_medium, rail_medium, cbtc_medium, the report",
+    "radio_medium, rail_medium, cbtc_medium, reference_medium, the report",
     "The truth of the tick, one row per train: where its antenna is, how it moves. "
     "Equipment does not read it.",
 )
@@ -110,7 +120,7 @@ DONE: Final = Topic(
     Header,
     STREAM,
     None,
-    "radio_medium, rail_medium, cbtc_medium, backbone, zone_controller",
+    "radio_medium, rail_medium, cbtc_medium, backbone, reference_medium, zone_controller",
     "world",
     "The node has finished the tick of this stamp.",
 )
@@ -139,9 +149,10 @@ FAILED: Final = Topic(
     None,
     "every node that waits for others, the report for the launcher: world, radio_medium, "
     "rail_medium, cbtc_medium, backbone, zone_controller, track_code_transmitter, "
-    "cbtc_base_station, code_supervision, cbtc_radio, atp",
+    "cbtc_base_station, code_supervision, cbtc_radio, atp, reference_medium, localizer",
     "world, radio_medium, rail_medium, cbtc_medium, backbone, zone_controller, "
-    "track_code_transmitter, cbtc_base_station, code_supervision, cbtc_radio, atp, the report",
+    "track_code_transmitter, cbtc_base_station, code_supervision, cbtc_radio, atp, "
+    "reference_medium, localizer, the report",
     "A node that is not waited for any longer, and why.",
 )
 DIAGNOSTICS: Final = Topic(
@@ -213,7 +224,7 @@ POSITION: Final = Topic(
     ESTIMATE,
     Position,
     "zone_controller",
-    "people, the report",
+    "localizer, people, the report",
     "Position of a train along its track by phase ranging; infinite variance = not known.",
 )
 
@@ -268,7 +279,7 @@ CODE_RECEIVED: Final = Topic(
     ESTIMATE,
     Table,
     "track_code_receiver",
-    "code_supervision, people, the report",
+    "code_supervision, localizer, people, the report",
     "The message understood on board: carrier in force, validity, the word and its fields.",
 )
 ODOMETER: Final = Topic(
@@ -277,7 +288,7 @@ ODOMETER: Final = Topic(
     STREAM,
     Table,
     "world",
-    "code_supervision, atp",
+    "code_supervision, atp, localizer",
     "What the wheels of a train count: distance and speed, with the error of their diameter.",
 )
 COMMAND: Final = Topic(
@@ -297,6 +308,8 @@ ALL: Final[tuple[Topic, ...]] = (
     *(CBTC_BASE_TX, CBTC_BASE_RX, CBTC_TRAIN_TX, CBTC_TRAIN_RX, DOWN_TELEGRAMS, UP_TELEGRAMS),
     *(TRAIN_TELEGRAMS, RADIO_TELEGRAMS, RADIO_LINK, CBTC_LINKS, ATP_STATE, REPORTS, AUTHORITY),
     *(BACKBONE_DOWN, BACKBONE_UP, STRIKES),
+    *(REFERENCE_TX, REFERENCE_RX, DOPPLER_FIX, DOPPLER_POSITION),
+    *(TOLD_POSITION, LOCALIZER_POSITION, LOCALIZER_STATE),
 )
 
 STATE_COLUMNS: Final = (
@@ -314,8 +327,8 @@ ODOMETER_COLUMNS: Final = ("distance_m", "speed_mps")
 RADIO_COLUMNS: Final = ("channel", "beacon_snr", "bursts")
 CBTC_LINK_COLUMNS: Final = ("base_index", "snr_down", "snr_up")
 ATP_COLUMNS: Final = (
-    *("front_m", "uncertainty_m", "end_of_authority_m", "authority_age_s"),
     *("accepted", "lost", "rejected"),
+    *("front_m", "uncertainty_m", "end_of_authority_m", "authority_age_s"),
 )
 AUTHORITY_COLUMNS: Final = (
     *("end_of_authority_m", "limit_mps", "worst_rear_m", "report_age_s"),
@@ -330,6 +343,15 @@ REPORT_COLUMNS: Final = (
 STRIKE_COLUMNS: Final = (
     *("frames", "repetition", "deletion", "insertion", "resequencing", "corruption", "delay"),
     "masquerade",
+)
+DOPPLER_COLUMNS: Final = (
+    *("reason", "chainage_m", "speed_mps"),
+    *("chainage_m2", "chainage_speed_m2ps", "speed_m2ps2", "tones", "offset_hz"),
+)
+TOLD_COLUMNS: Final = ("time_s", "position_m", "half_m")
+LOCALIZER_COLUMNS: Final = (
+    *("status", "reason", "found", "excluded"),
+    *("front_m", "low_m", "high_m", "speed_mps", "speed_low_mps", "speed_high_mps", "sigma_m"),
 )
 COMMAND_COLUMNS: Final = ("permitted_mps", "warning", "service_brake", "emergency_brake")
 

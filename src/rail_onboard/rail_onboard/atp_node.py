@@ -1,13 +1,14 @@
 """Automatic train protection: obeys movement authorities received by radio, reports the train.
 
-Topics in: ``/<train>/cbtc_radio/telegrams``, ``/<train>/odometer``. Topics out: ``command``,
-``telegrams``, ``state``.
+Topics in: ``/<train>/cbtc_radio/telegrams``, ``/<train>/odometer``, with a localizer its
+``state``. Topics out: ``command``, ``telegrams``, ``state``, ``told_position``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf, isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -25,10 +26,12 @@ from rail_msgs_py.train_channel import train_end
 from rail_onboard.authority_supervision import AuthoritySupervision
 from rail_onboard.braking_curve import GuaranteedBraking
 from rail_onboard.code_supervision import SupervisionOutput, Thresholds
-from rail_onboard.train_location import TrainLocation
+from rail_onboard.train_location import NOWHERE, Location, TrainLocation
 from rail_onboard.train_protection import TrainIdentity, TrainProtection
 
-_ODOMETER, _RADIO = "odometer", "radio"
+_ODOMETER, _RADIO, _LOCALIZER = "odometer", "radio", "localizer"
+_LOCATED = {name: index for index, name in enumerate(topics.LOCALIZER_COLUMNS)}
+_NOT_TOLD = (nan, nan, inf)
 _OFF = SupervisionOutput(0.0, True, True, True, "switched off")
 
 
@@ -62,6 +65,7 @@ class AtpParameters:
     authority_timeout_s: float = parameter(
         3.0, "age of an authority that makes the train brake", unit="s", low=0.1, high=600.0
     )
+    localizer: bool = parameter(False, "whether the position is that of a localizer")
     secret: str = parameter("00" * 16, "of the safe channel, in hexadecimal digits")
     seed: int = parameter(0, "of the nonces of the safe channel", low=0)
     tick_s: float = parameter(0.25, "time of a tick", unit="s", low=0.01, high=1.0)
@@ -122,8 +126,13 @@ class AtpNode(Equipment):
         self._p = declare(self, AtpParameters)
         self._protection = protection_of(self._p)
         train = namespace.strip("/")
-        self._inbox: TickInbox[Any] = TickInbox([_ODOMETER, _RADIO])
         owners = {_RADIO: f"/{train}/cbtc_radio"}
+        if self._p.localizer:
+            owners[_LOCALIZER] = topics.LOCALIZER_STATE.owner(train=train)
+            self.stream_in(topics.LOCALIZER_STATE, self._on_located, train=train)
+            self._tell_position = self.stream_out(topics.TOLD_POSITION, train=train)
+            self._told_table = TableWriter((train,), topics.TOLD_COLUMNS)
+        self._inbox: TickInbox[Any] = TickInbox([_ODOMETER, *owners])
         self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
         self._command = self.stream_out(topics.COMMAND, train=train, supervision=name)
         self._tell = self.stream_out(topics.TRAIN_TELEGRAMS, train=train)
@@ -150,6 +159,11 @@ class AtpNode(Equipment):
         self._inbox.put(heard.stamp_ns, _RADIO, heard)
         self._advance()
 
+    def _on_located(self, raw: bytes) -> None:
+        stamp_ns, figures = figures_from_cdr(raw, 1, len(topics.LOCALIZER_COLUMNS))
+        self._inbox.put(stamp_ns, _LOCALIZER, figures[0].tolist())
+        self._advance()
+
     def _advance(self) -> None:
         while self._inbox.complete:
             self._watch.end()
@@ -160,14 +174,22 @@ class AtpNode(Equipment):
         heard = items.get(_RADIO)
         frames = heard.in_slot(self._p.number) if heard else []
         protection = self._protection
+        located, doubt_mps = None, 0.0
+        if self._p.localizer:
+            located, speed_mps, doubt_mps = _located(items.get(_LOCALIZER), speed_mps)
         out, sent = _OFF, []
         if self.switched_on:
-            out = protection.tick(stamp_ns, distance_m, speed_mps, frames)
+            out = protection.tick(stamp_ns, distance_m, speed_mps, frames, located)
             sent = [(self._p.number, protection.frame(stamp_ns, speed_mps))]
         self._tell(telegrams(stamp_ns, sent))
+        if self._p.localizer:
+            newest = max(protection.told, default=_NOT_TOLD) if self.switched_on else _NOT_TOLD
+            self._tell_position(self._told_table.write(stamp_ns, np.array([newest])))
         figures = np.array([protection.figures(stamp_ns)], dtype=np.float64)
         self._state(self._state_table.write(stamp_ns, figures))
-        command = [[out.permitted_mps, out.warning, out.service_brake, out.emergency_brake]]
+        # The driver keeps to it by his own speed, supervision judges the fastest it may be.
+        permitted_mps = max(0.0, out.permitted_mps - doubt_mps)
+        command = [[permitted_mps, out.warning, out.service_brake, out.emergency_brake]]
         self._command(self._command_table.write(stamp_ns, np.array(command, dtype=np.float64)))
         self.report(
             DiagnosticStatus.WARN if out.reason else DiagnosticStatus.OK,
@@ -175,6 +197,23 @@ class AtpNode(Equipment):
             out.reason or "running",
             stamp_ns=stamp_ns,
         )
+
+
+def _located(figures: list[float] | None, wheels_mps: float) -> tuple[Location, float, float]:
+    """Where a localizer says that the front is, the fastest that the train may run, the doubt.
+
+    The doubt is by how much that is above the speed that is believed [m/s].
+    """
+    if figures is None:
+        return NOWHERE, wheels_mps, 0.0
+    low_m, high_m = figures[_LOCATED["low_m"]], figures[_LOCATED["high_m"]]
+    if not (isfinite(low_m) and isfinite(high_m)):
+        return NOWHERE, wheels_mps, 0.0
+    bounds = (figures[_LOCATED["speed_low_mps"]], figures[_LOCATED["speed_high_mps"]])
+    fastest_mps = max(abs(bound) for bound in bounds)
+    half_m = 0.5 * (high_m - low_m)
+    doubt_mps = max(0.0, fastest_mps - abs(figures[_LOCATED["speed_mps"]]))
+    return Location(low_m + half_m, half_m, True), fastest_mps, doubt_mps
 
 
 def main() -> None:

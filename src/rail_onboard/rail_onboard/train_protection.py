@@ -14,7 +14,7 @@ from rail_msgs_py.train_channel import CountedChannel
 from rail_msgs_py.train_report import FASTEST_MPS, WIDEST_M, LocationReport
 from rail_onboard.authority_supervision import Authority, AuthoritySupervision
 from rail_onboard.code_supervision import SupervisionOutput
-from rail_onboard.train_location import TrainLocation
+from rail_onboard.train_location import NOWHERE, Location, TrainLocation
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,9 @@ class TrainIdentity:
 class TrainProtection:
     """Takes frames and the odometer, gives the train's own frame and what it may do.
 
+    Where the front is it works out itself, from what it is told and from the odometer, or takes
+    from a localizer.
+
     Parameters
     ----------
     identity : TrainIdentity
@@ -55,6 +58,9 @@ class TrainProtection:
         self._identity, self._channel = identity, CountedChannel(channel)
         self._location, self._supervision = location, supervision
         self._placed = False
+        self._here = NOWHERE
+        #: Ranged positions told in the tick: when sealed [s], position, half-width [m].
+        self.told: list[tuple[float, float, float]] = []
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -62,10 +68,16 @@ class TrainProtection:
         return self._channel.counts
 
     def tick(
-        self, time_ns: int, distance_m: float, speed_mps: float, frames: Iterable[bytes]
+        self,
+        time_ns: int,
+        distance_m: float,
+        speed_mps: float,
+        frames: Iterable[bytes],
+        located: Location | None = None,
     ) -> SupervisionOutput:
-        """One tick: odometer and frames received in it."""
+        """One tick: odometer and frames received in it, and where a localizer says the front is."""
         time_s = time_ns / NANOSECONDS
+        self.told = []
         self._location.update(time_s, distance_m, speed_mps)
         if not self._placed:
             train = self._identity
@@ -75,8 +87,8 @@ class TrainProtection:
             authority = self._read(frame, time_ns)
             if authority is not None and (newest is None or authority.sealed_s > newest.sealed_s):
                 newest = authority
-        here = self._location.location(time_s)
-        return self._supervision.update(time_s, here, speed_mps, authority=newest)
+        self._here = self._location.location(time_s) if located is None else located
+        return self._supervision.update(time_s, self._here, speed_mps, authority=newest)
 
     def _read(self, frame: bytes, time_ns: int) -> Authority | None:
         _, opened = self._channel.open(frame, time_ns)
@@ -95,6 +107,7 @@ class TrainProtection:
         sealed_s = time_ns / NANOSECONDS - opened.age_s
         if told.located is not None:
             self._location.fix(sealed_s, *told.located)
+            self.told.append((sealed_s, *told.located))
         return Authority(
             sealed_s,
             told.end_of_authority_m,
@@ -105,9 +118,8 @@ class TrainProtection:
         )
 
     def frame(self, time_ns: int, speed_mps: float) -> bytes:
-        """The train's own frame, which tells where it is at this time."""
-        train = self._identity
-        here = self._location.location(time_ns / NANOSECONDS)
+        """The train's own frame, which tells where it is in this tick."""
+        train, here = self._identity, self._here
         valid = here.valid and here.uncertainty_m <= WIDEST_M
         report = LocationReport(
             train.number,
@@ -125,12 +137,11 @@ class TrainProtection:
     def figures(self, time_ns: int) -> tuple[float, ...]:
         """Figures as ``rail_msgs_py.topics.ATP_COLUMNS``; NaN where there is none."""
         time_s = time_ns / NANOSECONDS
-        here = self._location.location(time_s)
-        held = self._supervision.authority
+        here, held = self._here, self._supervision.authority
         return (
+            *self.counts,
             here.position_m if here.valid else nan,
             here.uncertainty_m if here.valid else inf,
             nan if held is None else held.end_m,
             inf if held is None else time_s - held.sealed_s,
-            *self.counts,
         )

@@ -11,6 +11,7 @@ from rail_world.description import JunctionDescription, TrackDescription
 from rail_world.network import Network, build_network
 from rail_world.radio_description import RadioDescription
 from rail_world.rail_description import RailDescription
+from rail_world.reference_description import ReferenceDescription
 from rail_world.threat_description import ThreatPeriod
 from rail_world.train_description import TrainDescription
 
@@ -23,6 +24,17 @@ class TrainStop(BaseModel):
     train: str
     from_s: float
     to_s: float
+
+
+class WheelSlip(BaseModel):
+    """Wheels that turn `ratio` times as fast as the train runs, from one time [s] to another."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    train: str
+    from_s: float
+    to_s: float
+    ratio: float = Field(ge=0.0, le=10.0)
 
 
 class WorldFile(BaseModel):
@@ -44,7 +56,9 @@ class WorldFile(BaseModel):
     threats: tuple[ThreatPeriod, ...] = Field(
         (), description="what an intruder does to the frames on the backbone"
     )
+    references: ReferenceDescription | None = None
     stops: tuple[TrainStop, ...] = ()
+    slips: tuple[WheelSlip, ...] = ()
     odometer_error: float = Field(
         0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' relative error"
     )

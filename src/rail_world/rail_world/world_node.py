@@ -29,6 +29,7 @@ from rail_msgs_py.table import TableWriter, figures_from_cdr
 from rail_world.corridor_map import markers, path_of
 from rail_world.drive_command import DriveCommand
 from rail_world.traffic import Traffic
+from rail_world.wheels import Wheels, wheel_errors
 from rail_world.world_file import read_world_file
 
 WATCH_PERIOD_S = 0.1
@@ -49,6 +50,7 @@ class WorldParameters:
     clock_readers: int = parameter(0, "readers of the clock that must be connected first", low=0)
     end_when_arrived: bool = parameter(False, "whether to end once every train has arrived")
     supervised: tuple[str, ...] = parameter((), "trains that wait for a command in every tick")
+    odometers: tuple[str, ...] = parameter((), "trains whose wheels are listened to")
     supervision: str = parameter(
         "code_supervision", "name of the node on each of them that commands it"
     )
@@ -102,11 +104,15 @@ class WorldNode(CorridorNode):
             for train in self._p.supervised
         }
         self._odometers = {
-            train: self.stream_out(topics.ODOMETER, train=train) for train in self._p.supervised
+            train: self.stream_out(topics.ODOMETER, train=train) for train in self._p.odometers
         }
-        self._wheels = wheel_errors(described.seed, described.odometer_error, self._p.supervised)
+        errors = wheel_errors(described.seed, described.odometer_error, self._p.odometers)
+        self._wheels = {
+            train: Wheels(error, [slip for slip in described.slips if slip.train == train])
+            for train, error in errors.items()
+        }
         self._odometer_tables = {
-            train: TableWriter((train,), topics.ODOMETER_COLUMNS) for train in self._p.supervised
+            train: TableWriter((train,), topics.ODOMETER_COLUMNS) for train in self._p.odometers
         }
         # Until its first command a train stands: what is not received is not permitted.
         self._commands = dict.fromkeys(self._p.supervised, _NOT_RECEIVED)
@@ -192,7 +198,7 @@ class WorldNode(CorridorNode):
             return
         travelled = self._traffic.travelled()
         for train, publish in self._odometers.items():
-            figures = np.array([travelled[train]]) * (1.0 + self._wheels[train])
+            figures = np.array([self._wheels[train].count(1e-9 * stamp_ns, *travelled[train])])
             publish(self._odometer_tables[train].write(stamp_ns, figures))
 
     def _publish_truth(self, stamp_ns: int) -> None:
@@ -301,12 +307,6 @@ class WorldNode(CorridorNode):
         if self._inbox.complete or not self._inbox.awaits_anything:
             self._obey(self._inbox.take()[1] if self._inbox.stamp_ns is not None else {})
             self._tick_over()
-
-
-def wheel_errors(seed: int, sigma: float, trains: tuple[str, ...]) -> dict[str, float]:
-    """Relative error of each train's odometer: that of the diameter of its wheels."""
-    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 3])))
-    return {train: sigma * float(rng.standard_normal()) for train in trains}
 
 
 def main() -> None:

@@ -1,0 +1,81 @@
+"""From a recording to figures: positions on board, by Doppler shifts and from all sensors."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rail_msgs_py.topics import DOPPLER_COLUMNS, LOCALIZER_COLUMNS, STATE_COLUMNS
+
+from .recording import FloatArray, Recording
+
+_STATE: Final = {name: index for index, name in enumerate(STATE_COLUMNS)}
+_DOPPLER: Final = {name: index for index, name in enumerate(DOPPLER_COLUMNS)}
+_LOCATED: Final = {name: index for index, name in enumerate(LOCALIZER_COLUMNS)}
+
+
+def positioning_metrics(recording: Recording, index: int) -> dict[str, Any]:
+    """Sections ``doppler`` and ``localizer`` of one train, as far as there are any."""
+    ticks = recording.ticks
+    mine = recording.state.upto(ticks)[:, index]
+    on_line = mine[:, _STATE["on_line"]] > 0.0
+    front_m = mine[:, _STATE["chainage_m"]]
+    found: dict[str, Any] = {}
+    if recording.references:
+        fixes = recording.doppler.upto(ticks)[:, index]
+        found["doppler"] = _doppler(on_line, front_m, fixes)
+    if recording.localizer:
+        located = recording.located.upto(ticks)[:, index]
+        found["localizer"] = _localizer(on_line, front_m, located)
+    return found
+
+
+def _doppler(
+    on_line: NDArray[np.bool_], front_m: FloatArray, fixes: FloatArray
+) -> dict[str, float | int | None]:
+    there = on_line & (fixes[:, _DOPPLER["reason"]] == 0.0)
+    error_m = fixes[there, _DOPPLER["chainage_m"]] - front_m[there]
+    variance_m2 = fixes[there, _DOPPLER["chainage_m2"]]
+    stated_m = float(np.sqrt(np.mean(variance_m2))) if error_m.size else None
+    return {
+        "availability": _share(there, on_line),
+        **_errors(error_m),
+        "stated_m": stated_m,
+        "normalised_error": float(np.mean(error_m**2 / variance_m2)) if error_m.size else None,
+    }
+
+
+def _localizer(
+    on_line: NDArray[np.bool_], front_m: FloatArray, located: FloatArray
+) -> dict[str, float | int | None]:
+    there = on_line & (located[:, _LOCATED["status"]] > 0.0)
+    low_m, high_m = located[there, _LOCATED["low_m"]], located[there, _LOCATED["high_m"]]
+    truth_m = front_m[there]
+    level_m = 0.5 * (high_m - low_m)
+    return {
+        "availability": _share(there, on_line),
+        "protected": _share(there & (located[:, _LOCATED["status"]] > 1.0), on_line),
+        **_errors(located[there, _LOCATED["front_m"]] - truth_m),
+        "protection_level_m": float(np.median(level_m)) if level_m.size else None,
+        "protection_level_p95_m": float(np.quantile(level_m, 0.95)) if level_m.size else None,
+        "exceeded": int(np.count_nonzero((truth_m < low_m) | (truth_m > high_m))),
+        "excluded_ticks": int(np.count_nonzero(located[there, _LOCATED["excluded"]] > 0.0)),
+    }
+
+
+def _errors(error_m: FloatArray) -> dict[str, float | int | None]:
+    size_m = np.abs(error_m)
+    if not size_m.size:
+        return {"rmse_m": None, "p95_m": None, "max_m": None}
+    return {
+        "rmse_m": float(np.sqrt(np.mean(size_m**2))),
+        "p95_m": float(np.quantile(size_m, 0.95)),
+        "max_m": float(size_m.max()),
+    }
+
+
+def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float | None:
+    count = int(np.count_nonzero(whole))
+    return float(np.count_nonzero(part)) / count if count else None

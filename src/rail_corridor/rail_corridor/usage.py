@@ -1,0 +1,37 @@
+"""What commands share: options, and that wrong use is one line and starts nothing."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ScenarioArgument = Annotated[
+    str, typer.Argument(help="Name of a built-in scenario, or a YAML file.", metavar="SCENARIO")
+]
+TrackOption = Annotated[
+    Path | None,
+    typer.Option("--track", help="TTOBench file that replaces the first track.", metavar="FILE"),
+]
+
+
+class UsageError(Exception):
+    """Wrong use of a command; one line."""
+
+
+def check_writable(option: str, path: Path) -> None:
+    """Raise UsageError for a file that cannot be written."""
+    if path.is_dir():
+        raise UsageError(f"{option}: {path}: is a directory")
+    if not path.absolute().parent.is_dir():
+        raise UsageError(f"{option}: {path}: there is no such directory")
+    if not os.access(path.absolute().parent, os.W_OK):
+        raise UsageError(f"{option}: {path}: cannot be written")
+
+
+def check_choice(option: str, value: str | None, choices: tuple[str, ...]) -> None:
+    """Raise UsageError if a value is none of those that are offered; None is no value."""
+    if value is not None and value not in choices:
+        raise UsageError(f"{option}: {value!r}: must be one of {', '.join(choices)}")

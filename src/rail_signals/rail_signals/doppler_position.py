@@ -224,7 +224,7 @@ class DopplerSolver:
             cost = np.where(v * direction < 0.0, measured.standing, cost)
         minima = np.flatnonzero((cost[1:-1] <= cost[:-2]) & (cost[1:-1] < cost[2:])) + 1
         ends = [i for i, j in ((0, 1), (-1, -2)) if cost[i] < cost[j]]
-        least = float(cost.min())
+        least = float(np.min(cost))
         if measured.standing <= least + _MOVING_SIGMAS**2:
             return Answer(Reason.STANDSTILL)
         order = minima[np.argsort(cost[minima])][:_MOST_CANDIDATES]

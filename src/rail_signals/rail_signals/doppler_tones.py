@@ -196,8 +196,8 @@ def _usable(x: ComplexArray) -> bool:
     # A clipped wave sits at both ends of the range again and again.
     most = _CLIPPED_SHARE * parts.size
     return not (
-        np.count_nonzero(parts == parts.max()) >= most
-        and np.count_nonzero(parts == parts.min()) >= most
+        np.count_nonzero(parts == np.max(parts)) >= most
+        and np.count_nonzero(parts == np.min(parts)) >= most
     )
 
 

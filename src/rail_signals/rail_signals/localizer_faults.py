@@ -166,9 +166,9 @@ class SensorFault:
             return self._wrong_station(healthy)
         if self.kind is Kind.BIAS:
             within_s = max(laws.bias_within_s, line.tick_s)
-            size = self._size * np.clip(since_s / within_s, 0.0, 1.0)
+            size = np.asarray(self._size * np.clip(since_s / within_s, 0.0, 1.0), dtype=np.float64)
         elif self.kind is Kind.DRIFT:
-            size = self._size * np.maximum(since_s, 0.0)
+            size = np.asarray(self._size * np.maximum(since_s, 0.0), dtype=np.float64)
         else:
             return np.asarray(self._size)
         if self.sensor is Sensor.ODOMETER:

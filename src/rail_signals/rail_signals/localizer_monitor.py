@@ -126,7 +126,7 @@ class IntegrityMonitor:
         refusals = [outcome.refused for outcome in outcomes if outcome.refused is not None]
         if self._any_struck or refusals:
             offered = self.use(sensor, present)
-            refused = np.logical_or.reduce(refusals) if refusals else False
+            refused = np.any(np.stack(refusals), axis=0) if refusals else False
             strikes = np.where(refused, self._strikes[sensor] + 1, 0)
             self._strikes[sensor] = np.where(offered, strikes, self._strikes[sensor])
             self._any_struck = bool(self._strikes.any())

@@ -70,7 +70,7 @@ def test_trains_may_go_once_the_channels_stand() -> None:
     for _ in range(8):
         reasons = corridor.step()
     assert set(reasons.values()) == {""}
-    ends = {n: train.figures(corridor.tick * TICK_NS)[2] for n, train in corridor.trains.items()}
+    ends = {n: train.figures(corridor.tick * TICK_NS)[5] for n, train in corridor.trains.items()}
     assert ends[1] == pytest.approx(3000.0 - 20.0)
     # Rear of the first, its uncertainty and the margin.
     assert 600.0 < ends[2] <= 1000.0 - LENGTH_M - 10.0
@@ -121,11 +121,11 @@ def test_a_range_that_contradicts_the_reports_is_not_told() -> None:
     corridor = Corridor(placed_m=5.0)
     for _ in range(8):
         corridor.step()
-    before = corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[:2]
+    before = corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[3:5]
     for _ in range(4):
         corridor.desk.ranged(1, corridor.tick * 0.25, 0, 1300.0, 0.01**2)
         corridor.step()
-    assert corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[:2] == before
+    assert corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[3:5] == before
     assert "report and range disagree" in corridor.desk.troubles(1)
 
 
@@ -136,5 +136,5 @@ def test_a_fix_moves_the_location() -> None:
     corridor.desk.ranged(1, 1.0, 0, 1000.4, 0.01**2)
     for _ in range(2):
         corridor.step()
-    front_m, half_m = corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[:2]
+    front_m, half_m = corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[3:5]
     assert abs(front_m - 1000.4) <= half_m < 2.0

@@ -13,7 +13,7 @@ from rail_corridor.overrides import Overrides
 from rail_corridor.scenario import Scenario, builtin_scenarios, load_scenario
 from rail_world.motion import TrainMotion
 
-COMPLETE = sorted(set(builtin_scenarios()) - {"real_line"})
+COMPLETE = sorted(set(builtin_scenarios()) - {"real_line", "real_line_sensors"})
 
 
 def write_line(path: Path, length_m: float = 2000.0) -> Path:

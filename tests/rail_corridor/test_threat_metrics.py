@@ -193,7 +193,7 @@ def test_a_report_that_the_train_did_not_give(column: str, value: float) -> None
     made = recording()
     for tick in range(21):
         made.state.put(tick, slice(None), np.zeros((2, len(STATE_COLUMNS))))
-        belief = [1000.0 + tick, 1.0, np.nan, np.inf, 0.0, 0.0, 0.0]
+        belief = [0.0, 0.0, 0.0, 1000.0 + tick, 1.0, np.nan, np.inf]
         made.atp.put(tick, 0, np.array(belief))
         assert len(belief) == len(ATP_COLUMNS)
     sound = dict.fromkeys(REPORT_COLUMNS, 1.0) | {"segment": 0.0, "length_m": 118.0}
@@ -210,7 +210,7 @@ def test_a_report_from_a_train_that_had_fallen_silent_is_forged() -> None:
     for tick in range(12):
         made.state.put(tick, slice(None), np.zeros((2, len(STATE_COLUMNS))))
         if tick < 8:
-            made.atp.put(tick, 0, np.array([1000.0, 1.0, np.nan, np.inf, 0.0, 0.0, 0.0]))
+            made.atp.put(tick, 0, np.array([0.0, 0.0, 0.0, 1000.0, 1.0, np.nan, np.inf]))
     row = dict.fromkeys(REPORT_COLUMNS, 1.0) | {"segment": 0.0, "offset_m": 1000.0}
     for tick, forged in ((7, 0), (8, 0), (9, 1)):
         # What was sealed in the tick after the last record may have been sent by a dying train.
@@ -230,7 +230,7 @@ def test_a_train_that_does_not_know_its_place_gives_no_valid_position() -> None:
     for half_m, front_m, valid in ((1.0, 1000.0, 1.0), (np.inf, np.nan, 0.0), (7e3, 1000.0, 0.0)):
         for tick in range(4):
             made.state.put(tick, slice(None), np.zeros((2, len(STATE_COLUMNS))))
-            made.atp.put(tick, 0, np.array([front_m, half_m, np.nan, np.inf, 0.0, 0.0, 0.0]))
+            made.atp.put(tick, 0, np.array([0.0, 0.0, 0.0, front_m, half_m, np.nan, np.inf]))
         for told in (0.0, 1.0):
             rows = np.array([list((row | {"sealed_s": TICK_S, "position_valid": told}).values())])
             made.reports.put(3, 0, rows)

@@ -7,7 +7,12 @@ import pytest
 from scipy.stats import chi2
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.doppler_bound import position_bound_m, shift_variance_hz2
+from rail_signals.doppler_bound import (
+    position_bound_m,
+    shift_information,
+    shift_variance_hz2,
+    tracked_bound_m,
+)
 from rail_signals.doppler_line import SurveyedLine
 from rail_signals.doppler_plan import TonePlan
 from rail_signals.doppler_position import (
@@ -190,6 +195,34 @@ def test_two_stations_and_an_unknown_offset_bound_nothing() -> None:
     line = SurveyedLine(s, s, 0.0 * s, 0.0 * s, 0.0 * s)
     stations = [[-500.0, 50.0, 0.0], [500.0, 50.0, 0.0]]
     assert np.isinf(position_bound_m(PLAN, line, stations, [100.0], 30.0, 1.0)).all()
+
+
+def test_the_bound_of_a_run_lies_between_an_unknown_and_a_known_offset() -> None:
+    """A walk without bound leaves every block alone; without walk the offset gets known."""
+    s = np.arange(-1000.0, 1001.0, 5.0)
+    line = SurveyedLine(s, s, 0.0 * s, 0.0 * s, 0.0 * s)
+    stations = [[-500.0, 50.0, 0.0], [100.0, -50.0, 0.0], [500.0, 50.0, 0.0]]
+    places = np.full(4000, 260.0)
+    information = shift_information(PLAN, line, stations, places, 83.0, 1.0)
+    given, alone = np.ones(places.size, bool), {"offset_sigma_hz": 1300.0, "speed_sigma_mps": 277.0}
+
+    def tracked(walk_hz: float, given: np.ndarray = given) -> np.ndarray:
+        return tracked_bound_m(information, given, walk_hz=walk_hz, **alone)
+
+    def single(offset_sigma_hz: float) -> float:
+        known = {"offset_sigma_hz": offset_sigma_hz, "speed_sigma_mps": 277.0}
+        return float(position_bound_m(PLAN, line, stations, places[:1], 83.0, 1.0, **known).item())
+
+    assert tracked(0.0)[0] == pytest.approx(single(1300.0), rel=1e-9)
+    np.testing.assert_allclose(tracked(1e6), single(1300.0), rtol=1e-4)
+    np.testing.assert_allclose(tracked(0.0, ~given), single(1300.0), rtol=1e-9)
+    assert tracked(0.0)[-1] == pytest.approx(single(0.0), rel=2e-3)
+    assert (np.diff(tracked(0.0)) < 0.0).all()
+    # At rest: the variance that a walk of q feeds and a block of information J takes away.
+    walk_hz = 0.5
+    posterior = np.linalg.inv(information[0] + np.diag([0.0, 277.0**-2, 0.0]))[2, 2]
+    prior = 0.5 * (walk_hz**2 + np.sqrt(walk_hz**4 + 4.0 * walk_hz**2 * posterior))
+    assert tracked(walk_hz)[-1] == pytest.approx(single(float(np.sqrt(prior))), rel=1e-6)
 
 
 def test_speed_from_position_and_shift() -> None:

@@ -14,19 +14,13 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from rail_signals.doppler_bound import position_bound_m, shift_variance_hz2
-from rail_signals.doppler_line import SurveyedLine
-from rail_world.reference_medium import ReferenceMedium
-
 from .errors import InputError
 from .figures import COLOURS, STYLE
-from .positioning_plan import reference_description
-from .positioning_section import ReferencePlan
+from .referenced_track import ReferencedTrack
 from .scenario import Scenario
 
 FloatArray = NDArray[np.float64]
 
-_STEP_M = 5.0
 #: Worse than this is drawn at the upper edge [m].
 _WORST_M = 100.0
 _LEAST_M = 1e-3
@@ -49,44 +43,15 @@ class Accuracy:
     sides: FloatArray
 
 
-def accuracy_of(
-    scenario: Scenario, track: str, speeds_kmh: Sequence[float], plan: ReferencePlan
-) -> Accuracy:
+def accuracy_of(scenario: Scenario, track: str, speeds_kmh: Sequence[float]) -> Accuracy:
     """Bounds along a track of a scenario, with its reference stations."""
-    described = reference_description(scenario)
-    assert described is not None
-    medium = ReferenceMedium(described, scenario.network, scenario.seed)
-    line_of = scenario.network.tracks[track]
-    count = int(np.ceil(line_of.length_m / _STEP_M)) + 1
-    s = np.linspace(0.0, line_of.length_m, count)
-    pose = line_of.pose(s)
-    line = SurveyedLine(s, pose.x_m, pose.y_m, pose.z_m, pose.heading_rad)
-    stations = [station for station in scenario.reference_stations if station.track == track]
-    places = np.array([station.position_m for station in stations])
-    distance = line.distances(places, s)
-    snr = medium.snr(distance, 10.0 ** (plan.power_dbm / 10.0))
-    own_hz = 1e-9 * plan.station_ppb * plan.carrier_hz
-    variance = shift_variance_hz2(plan.tones, snr) + own_hz**2
-    offset_hz = 1e-6 * plan.receiver_ppm * plan.carrier_hz
-    bounds = [
-        position_bound_m(
-            plan.tones,
-            line,
-            places,
-            s,
-            speed / 3.6,
-            variance,
-            reach_m=plan.reach_m,
-            offset_sigma_hz=offset_hz,
-            speed_sigma_mps=2.0 * plan.tones.max_speed_mps,
-        )
-        for speed in speeds_kmh
-    ]
-    feet = np.array([station.chainage_m for station in stations])
-    foot = line_of.pose(feet)
-    left = -np.sin(foot.heading_rad) * (places[:, 0] - foot.x_m) + np.cos(foot.heading_rad) * (
-        places[:, 1] - foot.y_m
-    )
+    here = ReferencedTrack.of(scenario, track)
+    s = here.line.chainage_m
+    bounds = [here.bound_m(s, speed / 3.6) for speed in speeds_kmh]
+    feet = np.array([station.chainage_m for station in here.stations])
+    foot = scenario.network.tracks[track].pose(feet)
+    left = -np.sin(foot.heading_rad) * (here.places_m[:, 0] - foot.x_m)
+    left += np.cos(foot.heading_rad) * (here.places_m[:, 1] - foot.y_m)
     return Accuracy(track, s, tuple(speeds_kmh), np.array(bounds), feet, np.sign(left))
 
 
@@ -100,10 +65,9 @@ def run_accuracy(
     InputError
         If the scenario has no reference stations.
     """
-    plan = scenario.references
-    if plan is None:
+    if scenario.references is None:
         raise InputError("has no reference stations", field="references", value=None)
-    found = [accuracy_of(scenario, track, speeds_kmh, plan) for track in scenario.tracks]
+    found = [accuracy_of(scenario, track, speeds_kmh) for track in scenario.tracks]
     table = Table(
         title="what geometry allows: bound of a Doppler position, one block",
         title_justify="left",

@@ -21,6 +21,7 @@ MODULES = {
     "ranging_receive": "ranging",
     "track_code_decode": "track_code",
     "cbtc_ber": "cbtc",
+    "doppler_solve": "doppler",
     "corridor_speed": "corridor",
 }
 

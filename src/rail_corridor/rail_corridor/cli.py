@@ -27,14 +27,18 @@ SeedOption = Annotated[
     int | None, typer.Option("--seed", help="Seed of every random draw.", metavar="N")
 ]
 DurationOption = Annotated[
-    float | None, typer.Option("--duration", help="Simulated time [s].", metavar="S")
+    float | None, typer.Option("--duration", help="Simulated time, in seconds.", metavar="S")
 ]
 TrainsOption = Annotated[
     int | None, typer.Option("--trains", help="Number of trains.", metavar="N")
 ]
 ZoneOption = Annotated[
     float | None,
-    typer.Option("--zone-length", help="No zone longer than this [m].", metavar="M"),
+    typer.Option("--zone-length", help="No zone longer than this, in metres.", metavar="M"),
+]
+ReverseOption = Annotated[
+    bool,
+    typer.Option("--reverse", help="Trains run the other way, from the other end of their track."),
 ]
 
 
@@ -45,11 +49,17 @@ def _load(
     track: Path | None,
     trains: int | None,
     zone_length: float | None,
+    reverse: bool,
 ) -> object:
     from .scenario import Overrides, load_scenario
 
     overrides = Overrides(
-        seed=seed, duration_s=duration, track=track, trains=trains, zone_length_m=zone_length
+        seed=seed,
+        duration_s=duration,
+        track=track,
+        trains=trains,
+        zone_length_m=zone_length,
+        reverse=reverse,
     )
     return load_scenario(scenario, overrides=overrides)
 
@@ -76,6 +86,7 @@ def run(
     track: TrackOption = None,
     trains: TrainsOption = None,
     zone_length: ZoneOption = None,
+    reverse: ReverseOption = False,
     report: Annotated[
         Path | None,
         typer.Option("--report", help="Write the report as JSON.", metavar="FILE.json"),
@@ -99,7 +110,7 @@ def run(
     timeout: Annotated[
         float,
         typer.Option(
-            "--timeout", help="Wall time after which a silent node is given up [s].", metavar="S"
+            "--timeout", help="A node silent for so many seconds is given up.", metavar="S"
         ),
     ] = 30.0,
     kill: Annotated[
@@ -123,7 +134,7 @@ def run(
     from .kills import parse_kill
 
     kills = tuple(parse_kill(text) for text in kill or ())
-    loaded = _load(scenario, seed, duration, track, trains, zone_length)
+    loaded = _load(scenario, seed, duration, track, trains, zone_length, reverse)
 
     from rich.console import Console
 
@@ -144,9 +155,10 @@ def check(
     track: TrackOption = None,
     trains: TrainsOption = None,
     zone_length: ZoneOption = None,
+    reverse: ReverseOption = False,
 ) -> None:
     """Validate a scenario and show what it would run; starts nothing."""
-    loaded = _load(scenario, seed, duration, track, trains, zone_length)
+    loaded = _load(scenario, seed, duration, track, trains, zone_length, reverse)
 
     from rich.console import Console
 

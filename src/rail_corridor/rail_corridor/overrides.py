@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
+
+from rail_world.description import TrainDescription
+from rail_world.network import Network
 
 from .errors import InputError
 
@@ -30,6 +33,8 @@ class Overrides:
         Automatic placing of stations with this zone length [m].
     reference_spacing_m, reference_offset_m : float, optional
         Reference stations so far apart and off the track [m].
+    reverse : bool
+        Trains run the other way, from the other end of their track.
     """
 
     seed: int | None = None
@@ -39,6 +44,7 @@ class Overrides:
     zone_length_m: float | None = None
     reference_spacing_m: float | None = None
     reference_offset_m: float | None = None
+    reverse: bool = False
 
 
 _OPTIONS: Final[Mapping[str, str]] = {
@@ -107,6 +113,31 @@ def _apply_train_count(data: dict[str, Any], count: int) -> None:
         data["timetable"] = None
     else:
         data["timetable"] = {**timetable, "count": count - len(listed)}
+
+
+def turned_round(
+    trains: Iterable[TrainDescription], network: Network
+) -> tuple[TrainDescription, ...]:
+    """Trains that run the other way, as far from the other end of their track.
+
+    Raises
+    ------
+    InputError
+        For a train that runs over more than one track, or turns back by itself.
+    """
+    found = []
+    for train in trains:
+        if len(train.route) > 1 or train.reverse_at:
+            raise InputError(
+                f"{train.name} runs over junctions or turns back",
+                file=COMMAND_LINE,
+                field="--reverse",
+                value=True,
+            )
+        length_m = network.tracks[train.route[0]].length_m
+        turned = {"direction": -train.direction, "start_m": length_m - train.start_m}
+        found.append(train.model_copy(update=turned))
+    return tuple(found)
 
 
 def blame_override(

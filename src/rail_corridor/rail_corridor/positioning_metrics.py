@@ -10,14 +10,20 @@ from numpy.typing import NDArray
 from rail_msgs_py.topics import DOPPLER_COLUMNS, LOCALIZER_COLUMNS, STATE_COLUMNS
 
 from .recording import FloatArray, Recording
+from .referenced_track import ReferencedTrack
+from .scenario import Scenario
 
 _STATE: Final = {name: index for index, name in enumerate(STATE_COLUMNS)}
 _DOPPLER: Final = {name: index for index, name in enumerate(DOPPLER_COLUMNS)}
 _LOCATED: Final = {name: index for index, name in enumerate(LOCALIZER_COLUMNS)}
 
 
-def positioning_metrics(recording: Recording, index: int) -> dict[str, Any]:
-    """Sections ``doppler`` and ``localizer`` of one train, as far as there are any."""
+def positioning_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
+    """Sections ``doppler`` and ``localizer`` of one train, as far as there are any.
+
+    ``bound_m`` is the Cramér-Rao bound over the same blocks, root mean square as ``rmse_m``;
+    what faults do to stations is not in it.
+    """
     ticks = recording.ticks
     mine = recording.state.upto(ticks)[:, index]
     on_line = mine[:, _STATE["on_line"]] > 0.0
@@ -25,7 +31,15 @@ def positioning_metrics(recording: Recording, index: int) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if recording.references:
         fixes = recording.doppler.upto(ticks)[:, index]
-        found["doppler"] = _doppler(on_line, front_m, fixes)
+        given = on_line & (fixes[:, _DOPPLER["reason"]] == 0.0)
+        bound_m = np.empty(0)
+        if given.any():
+            here = ReferencedTrack.of(scenario, scenario.trains[index].route[0])
+            speed_mps = mine[on_line, _STATE["speed_mps"]]
+            positions = given[on_line]
+            bounds_m = here.run_bound_m(front_m[on_line], speed_mps, positions, scenario.tick_s)
+            bound_m = bounds_m[positions]
+        found["doppler"] = _doppler(on_line, front_m, fixes, bound_m)
     if recording.localizer:
         located = recording.located.upto(ticks)[:, index]
         found["localizer"] = _localizer(on_line, front_m, located)
@@ -33,7 +47,7 @@ def positioning_metrics(recording: Recording, index: int) -> dict[str, Any]:
 
 
 def _doppler(
-    on_line: NDArray[np.bool_], front_m: FloatArray, fixes: FloatArray
+    on_line: NDArray[np.bool_], front_m: FloatArray, fixes: FloatArray, bound_m: FloatArray
 ) -> dict[str, float | int | None]:
     there = on_line & (fixes[:, _DOPPLER["reason"]] == 0.0)
     error_m = fixes[there, _DOPPLER["chainage_m"]] - front_m[there]
@@ -42,6 +56,7 @@ def _doppler(
     return {
         "availability": _share(there, on_line),
         **_errors(error_m),
+        "bound_m": float(np.sqrt(np.mean(bound_m**2))) if bound_m.size else None,
         "stated_m": stated_m,
         "normalised_error": float(np.mean(error_m**2 / variance_m2)) if error_m.size else None,
     }

@@ -21,6 +21,8 @@ from .positioning_section import LocalizerPlan, ReferencePlan
 from .scenario import Scenario
 
 REFERENCE_MEDIUM: Final = "/world/reference_medium"
+#: Random walk that a positioner counts on of its own oscillator, after a second [Hz].
+WALK_HZ: Final = 0.5
 #: Points of the line that a positioner is given are so far apart [m].
 _LINE_STEP_M: Final = 5.0
 
@@ -92,6 +94,7 @@ def _positioner(scenario: Scenario, plan: ReferencePlan, train: TrainDescription
         "track": train.route[0],
         "direction": train.direction,
         "start_m": train.start_m,
+        "walk_hz": WALK_HZ,
         "station_hz": 1e-9 * plan.station_ppb * plan.carrier_hz,
         "localizer": scenario.localizer is not None,
     }

@@ -45,7 +45,7 @@ def make_report(
             section |= code_metrics(scenario, recording, index)
         if recording.cbtc:
             section |= cbtc_metrics(scenario, recording, index)
-        section |= positioning_metrics(recording, index)
+        section |= positioning_metrics(scenario, recording, index)
         trains[name] = section
     threats = {"threats": threat_metrics(recording)} if recording.threatened else {}
     return {
@@ -197,9 +197,9 @@ def _print_threats(report: dict[str, Any], console: Console) -> None:
 
 def _print_positions(trains: dict[str, Any], console: Console) -> None:
     """Show what trains found out about their place by themselves."""
-    title = "positions on board"
+    title = "positions on board, in metres"
     table = Table(title=title, title_justify="left", title_style="bold")
-    headings = ("train", "by", "known", "RMSE m", "95 % m", "max m", "level m", "over")
+    headings = ("train", "by", "known", "RMSE", "bound", "95 %", "max", "level", "over")
     for heading in headings:
         left = heading in ("train", "by")
         table.add_column(heading, justify="left" if left else "right", no_wrap=True)
@@ -213,7 +213,7 @@ def _print_positions(trains: dict[str, Any], console: Console) -> None:
                 name,
                 label,
                 _percent(found["availability"]),
-                *(_metres(found[column]) for column in ("rmse_m", "p95_m", "max_m")),
+                *(_metres(found.get(column)) for column in ("rmse_m", "bound_m", "p95_m", "max_m")),
                 "" if level_m is None else f"{level_m:.1f}",
                 str(found.get("exceeded", "")),
             )

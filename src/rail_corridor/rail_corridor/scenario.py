@@ -27,7 +27,7 @@ from .circuits import Circuit, place_circuits
 from .errors import InputError, from_validation
 from .fault_sections import Fault
 from .layout import Layout, place_stations
-from .overrides import Overrides, apply_overrides, blame_override
+from .overrides import Overrides, apply_overrides, blame_override, turned_round
 from .positioning_section import LocalizerPlan, ReferencePlan
 from .reference_stations import Reference, place_references
 from .scenario_checks import check_scenario
@@ -211,12 +211,14 @@ def load_scenario(name_or_path: str | Path, *, overrides: Overrides | None = Non
     overrides = overrides or Overrides()
     origins = apply_overrides(data, overrides)
     try:
-        return scenario_from_data(data, directory=path.parent)
+        return scenario_from_data(data, directory=path.parent, reverse=overrides.reverse)
     except InputError as error:
         raise blame_override(error, overrides, origins).located(str(path)) from None
 
 
-def scenario_from_data(data: Mapping[str, Any], *, directory: Path) -> Scenario:
+def scenario_from_data(
+    data: Mapping[str, Any], *, directory: Path, reverse: bool = False
+) -> Scenario:
     """Make a scenario from plain data, as they stand in a file.
 
     Parameters
@@ -225,6 +227,8 @@ def scenario_from_data(data: Mapping[str, Any], *, directory: Path) -> Scenario:
         The top level of the file.
     directory : Path
         Where relative names of track files start from.
+    reverse : bool
+        Whether trains run the other way, from the other end of their track.
 
     Raises
     ------
@@ -258,6 +262,10 @@ def scenario_from_data(data: Mapping[str, Any], *, directory: Path) -> Scenario:
     }
     scenario = scenario.model_copy(update={"trains": trains, "timetable": None, "tracks": tracks})
     check_scenario(scenario, fields)
+    if reverse:
+        trains = turned_round(trains, scenario.network)
+        scenario = scenario.model_copy(update={"trains": trains})
+        check_scenario(scenario, fields)
     return scenario
 
 

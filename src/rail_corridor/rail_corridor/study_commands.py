@@ -112,11 +112,13 @@ def accuracy(
     track: TrackOption = None,
     spacing: Annotated[
         float | None,
-        typer.Option("--spacing", help="Reference stations so far apart [m].", metavar="M"),
+        typer.Option(
+            "--spacing", help="Reference stations so many metres apart at most.", metavar="M"
+        ),
     ] = None,
     offset: Annotated[
         float | None,
-        typer.Option("--offset", help="Reference stations so far off the track [m].", metavar="M"),
+        typer.Option("--offset", help="So many metres off the track.", metavar="M"),
     ] = None,
     speed: Annotated[
         list[float] | None,

@@ -34,7 +34,7 @@ REFERENCE_RX: Final = Topic(
 DOPPLER_FIX: Final = Topic(
     "/{train}/doppler/fix",
     Float64MultiArray,
-    STREAM,
+    ESTIMATE,
     Table,
     "doppler_positioner",
     "localizer, people, the report",
@@ -71,7 +71,7 @@ LOCALIZER_POSITION: Final = Topic(
 LOCALIZER_STATE: Final = Topic(
     "/{train}/localizer/state",
     Float64MultiArray,
-    STREAM,
+    ESTIMATE,
     Table,
     "localizer",
     "atp, people, the report",

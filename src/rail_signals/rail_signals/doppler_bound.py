@@ -11,6 +11,8 @@ from rail_signals.doppler_plan import TonePlan
 from rail_signals.ranging_signal import FloatArray
 
 _DERIVATIVE_M = 0.5
+#: What is left of the information on the chainage below this share of it is rounding.
+_LEAST_SHARE = 1e-11
 
 
 def shift_variance_hz2(plan: TonePlan, snr: ArrayLike) -> FloatArray:
@@ -23,12 +25,44 @@ def shift_variance_hz2(plan: TonePlan, snr: ArrayLike) -> FloatArray:
     )
 
 
+def shift_information(
+    plan: TonePlan,
+    line: SurveyedLine,
+    stations_m: ArrayLike,
+    chainage_m: ArrayLike,
+    speed_mps: ArrayLike,
+    variance_hz2: ArrayLike,
+    *,
+    reach_m: float = np.inf,
+) -> FloatArray:
+    """Fisher information of a block on chainage, speed and offset [points, 3, 3].
+
+    In 1/m^2, 1/(m/s)^2 and 1/Hz^2; the parameters are those of `position_bound_m`.
+    """
+    places = np.asarray(chainage_m, dtype=np.float64)
+    antennas = np.asarray(stations_m, dtype=np.float64)
+    speed = np.broadcast_to(np.asarray(speed_mps, dtype=np.float64), places.shape)
+    way = speed * plan.averaging_time_s
+
+    def mean_rate(at: FloatArray) -> FloatArray:
+        return 0.5 * (line.rates(antennas, at - way) + line.rates(antennas, at + way))
+
+    per_mps = -plan.carrier_hz / SPEED_OF_LIGHT_M_PER_S
+    rows = np.ones((*places.shape, antennas.shape[0], 3))
+    bend = mean_rate(places + _DERIVATIVE_M) - mean_rate(places - _DERIVATIVE_M)
+    rows[..., 0] = per_mps * speed[..., None] * bend / (2.0 * _DERIVATIVE_M)
+    rows[..., 1] = per_mps * mean_rate(places)
+    heard = line.distances(antennas, places) <= reach_m
+    weight = np.where(heard, 1.0 / np.broadcast_to(variance_hz2, heard.shape), 0.0)
+    return np.asarray(np.einsum("...na,...n,...nb->...ab", rows, weight, rows))
+
+
 def position_bound_m(
     plan: TonePlan,
     line: SurveyedLine,
     stations_m: ArrayLike,
     chainage_m: ArrayLike,
-    speed_mps: float,
+    speed_mps: ArrayLike,
     variance_hz2: ArrayLike,
     *,
     reach_m: float = np.inf,
@@ -43,7 +77,7 @@ def position_bound_m(
     line : SurveyedLine
     stations_m : float [stations, 3]
     chainage_m : float [points]
-    speed_mps : float
+    speed_mps : float, or [points]
     variance_hz2 : float, or [points, stations]
         Of the shifts [Hz^2].
     reach_m : float
@@ -64,23 +98,11 @@ def position_bound_m(
     >>> bound.round(1).tolist()
     [49.7, 12.4]
     """
-    places = np.asarray(chainage_m, dtype=np.float64)
-    antennas = np.asarray(stations_m, dtype=np.float64)
-    way = speed_mps * plan.averaging_time_s
-
-    def mean_rate(at: FloatArray) -> FloatArray:
-        return 0.5 * (line.rates(antennas, at - way) + line.rates(antennas, at + way))
-
-    per_mps = -plan.carrier_hz / SPEED_OF_LIGHT_M_PER_S
-    rows = np.ones((*places.shape, antennas.shape[0], 3))
-    bend = mean_rate(places + _DERIVATIVE_M) - mean_rate(places - _DERIVATIVE_M)
-    rows[..., 0] = per_mps * speed_mps * bend / (2.0 * _DERIVATIVE_M)
-    rows[..., 1] = per_mps * mean_rate(places)
-    heard = line.distances(antennas, places) <= reach_m
-    weight = np.where(heard, 1.0 / np.broadcast_to(variance_hz2, heard.shape), 0.0)
+    information = shift_information(
+        plan, line, stations_m, chainage_m, speed_mps, variance_hz2, reach_m=reach_m
+    )
     known = [0, *(i for i, s in ((1, speed_sigma_mps), (2, offset_sigma_hz)) if s > 0.0)]
-    rows = rows[..., known]
-    information = np.einsum("...na,...n,...nb->...ab", rows, weight, rows)
+    information = information[..., known, :][..., known]
     for place, number in enumerate(known):
         sigma = {1: speed_sigma_mps, 2: offset_sigma_hz}.get(number, np.inf)
         if np.isfinite(sigma):
@@ -95,3 +117,42 @@ def position_bound_m(
     open_ = (~ranked & (np.abs(vectors[..., 0, :]) > 1e-6)).any(axis=-1)
     bound = np.sqrt(parts.sum(axis=-1)) / safe[..., 0]
     return np.asarray(np.where(open_ | (diagonal[..., 0] == 0.0), np.inf, bound))
+
+
+def tracked_bound_m(
+    information: FloatArray,
+    given: ArrayLike,
+    *,
+    offset_sigma_hz: float,
+    walk_hz: float,
+    speed_sigma_mps: float,
+) -> FloatArray:
+    """Bound of the positions of a run whose offset is carried on from block to block [blocks].
+
+    Parameters
+    ----------
+    information : float [blocks, 3, 3]
+        Of `shift_information`, block after block.
+    given : bool [blocks]
+        Whether the offset found with a block is carried on.
+    offset_sigma_hz, speed_sigma_mps : float
+        How well the receiver's offset is known at first, and the speed at any time.
+    walk_hz : float
+        Random walk of the offset from block to block, standard deviation [Hz].
+    """
+    bound = np.empty(information.shape[0])
+    variance = offset_sigma_hz**2
+    for block, (mine, carried) in enumerate(zip(information, np.asarray(given), strict=True)):
+        total = mine.copy()
+        total[1, 1] += speed_sigma_mps**-2
+        total[2, 2] += 1.0 / variance
+        # Speed and offset first: they always have information, the chainage may have none.
+        rest = np.linalg.inv(total[1:, 1:])
+        chainage = total[0, 0] - total[0, 1:] @ rest @ total[1:, 0]
+        certain = chainage > _LEAST_SHARE * total[0, 0]
+        bound[block] = chainage**-0.5 if certain else np.inf
+        if carried and certain:
+            gain = rest @ total[1:, 0]
+            variance = rest[1, 1] + gain[1] ** 2 * bound[block] ** 2
+        variance += walk_hz**2
+    return bound

@@ -146,6 +146,8 @@ class DopplerSolver:
         self._worst_m = worst_sigma_m
         cells = max(2, int(np.ceil((line.end_m - line.start_m) / grid_m)))
         self._grid_m = np.linspace(line.start_m, line.end_m, cells + 1)
+        #: Step of the search [m].
+        self.grid_step_m = (line.end_m - line.start_m) / cells
         self._rates = line.rates(self.stations_m, self._grid_m).T.copy()  # [station, point]
         offsets = np.array([plan.slot_offset_hz(int(slot)) for slot in self.slots])
         self._scale = (plan.carrier_hz + offsets) / plan.carrier_hz

@@ -240,7 +240,9 @@ def run_checks(pytest_arguments: list[str]) -> int:
             if subprocess.run(command, cwd=ROOT, env=env, check=False).returncode:
                 failed.append(name)
         # Tests marked `system` come in two groups, each on one worker (tests/conftest.py).
-        pytest_arguments = ["-n", "2", "--dist", "loadgroup", "--timeout", "300", "-q"]
+        # A test that hangs below Python ends with its worker, and its stack is printed.
+        limit = ["--timeout", "300", "--timeout-method", "thread"]
+        pytest_arguments = ["-n", "2", "--dist", "loadgroup", *limit, "-q"]
     print("== pytest", flush=True)
     command = [python, "-m", "pytest", *pytest_arguments]
     code = subprocess.run(command, cwd=ROOT, env=env, check=False).returncode

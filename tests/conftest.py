@@ -46,13 +46,11 @@ _ONLY_RUN = {
 }
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_itemcollected(item: pytest.Item) -> None:
     """Put system tests into two groups, one after the other within each: they start processes.
 
     Those that look at the wall clock are in the first; the second only runs corridors to their end.
     """
-    for item in items:
-        if item.get_closest_marker("system"):
-            calm = item.path.stem in _ONLY_RUN
-            item.add_marker(pytest.mark.xdist_group("system_runs" if calm else "system"))
+    if item.get_closest_marker("system"):
+        calm = item.path.stem in _ONLY_RUN
+        item.add_marker(pytest.mark.xdist_group("system_runs" if calm else "system"))

@@ -30,7 +30,7 @@ def test_topics_echo_and_hz_of_a_running_corridor(
     rail: Rail, listener: Listener, wait_until: Callable[..., Any]
 ) -> None:
     clock = listener.listen(topics.CLOCK)
-    run = rail.start("run", "plain_line", "--rate", 2, "--processes", "one")
+    run = rail.start("run", "plain_line", "--duration", 600, "--rate", 2, "--processes", "one")
     listener.until(lambda: len(clock) > 2)
 
     echoes = {topic: rail.start("echo", topic, "--once") for topic in ECHOES}

@@ -67,7 +67,8 @@ class Rail:
         sources = os.pathsep.join(str(path) for path in sorted((ROOT / "src").glob("rail_*")))
         path = os.pathsep.join(filter(None, (sources, os.environ.get("PYTHONPATH"))))
         mine = {"PYTHONPATH": path, "ROS_DOMAIN_ID": str(self.domain), _TOKEN: self.token}
-        return {**os.environ, **mine}
+        inherited = {k: v for k, v in os.environ.items() if k != "FASTDDS_BUILTIN_TRANSPORTS"}
+        return {**inherited, **mine}
 
     def start(self, *arguments: object, command: list[str] | None = None) -> subprocess.Popen[str]:
         """Start ``rail`` or another command; its output goes to files."""

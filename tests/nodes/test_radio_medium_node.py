@@ -153,7 +153,8 @@ def test_a_silent_node_is_named_and_the_corridor_goes_on(graph: Any, plan: Plan)
     # The train does not answer either.
     air.at_stations(1)
     assert [status.name for status in graph.failed] == [missing, f"/{TRAIN}/vrs"]
-    assert {pair.value for status in graph.failed for pair in status.values} == {MEDIUM}
+    values = {(pair.key, pair.value) for status in graph.failed for pair in status.values}
+    assert values == {("detected_by", MEDIUM), ("time_s", "0.0")}
     # Neither is waited for from now on...
     air.move(1, 152.0)
     air.call(1, zones=every[:-1])

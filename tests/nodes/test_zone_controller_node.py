@@ -100,7 +100,8 @@ def test_a_station_that_does_not_answer_is_named_and_the_tick_goes_on(
     assert [status.name for status in graph.failed] == [f"/wayside/{controller.places['zone4']}"]
     (failed,) = graph.failed
     assert failed.message.startswith("no answer within")
-    assert {pair.key: pair.value for pair in failed.values} == {"detected_by": CONTROLLER}
+    values = {pair.key: pair.value for pair in failed.values}
+    assert values == {"detected_by": CONTROLLER, "time_s": "0.0"}
     # It is not waited for in the next tick, and again once it is heard.
     controller.read(1, {"zone1": distance_m(152.0)}, missing=("zone4",))
     assert controller.position(2).known

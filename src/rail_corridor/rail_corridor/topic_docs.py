@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from rail_msgs_py import topics
+from rail_msgs_py.message_definition import type_name
 from rail_msgs_py.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
 from rail_onboard.atp_node import AtpParameters
 from rail_onboard.cbtc_radio_node import CbtcRadioParameters
@@ -143,17 +144,6 @@ def parameter_table(kind: str) -> str:
             f" | {about['unit']} | {_bounds(about['low'], about['high'])} | {about['text']} |"
         )
     return "\n".join(rows) + "\n"
-
-
-def type_name(message: Any) -> str:
-    """Return the ROS name of a message class.
-
-    >>> from std_msgs.msg import Header
-    >>> type_name(Header)
-    'std_msgs/msg/Header'
-    """
-    package, kind, *_ = message.__module__.split(".")
-    return f"{package}/{kind}/{message.__name__}"
 
 
 def _type(hint: Any) -> str:

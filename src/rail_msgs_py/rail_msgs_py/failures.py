@@ -9,11 +9,12 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from rail_msgs_py import topics
 from rail_msgs_py.inbox import TickInbox
+from rail_msgs_py.stamps import NANOSECONDS
 
 WATCH_PERIOD_S = 0.1
 
 
-def failure(node: str, reason: str, detected_by: str) -> DiagnosticStatus:
+def failure(node: str, reason: str, detected_by: str, stamp_ns: int = 0) -> DiagnosticStatus:
     """Message on ``/failed``.
 
     Parameters
@@ -22,13 +23,18 @@ def failure(node: str, reason: str, detected_by: str) -> DiagnosticStatus:
         Fully qualified name of the node that failed.
     reason, detected_by : str
         For the report.
+    stamp_ns : int
+        Simulated time of the tick in which it was noticed.
     """
     return DiagnosticStatus(
         level=DiagnosticStatus.ERROR,
         name=node,
         message=reason,
         hardware_id=node,
-        values=[KeyValue(key="detected_by", value=detected_by)],
+        values=[
+            KeyValue(key="detected_by", value=detected_by),
+            KeyValue(key="time_s", value=repr(stamp_ns / NANOSECONDS)),
+        ],
     )
 
 
@@ -59,17 +65,18 @@ class FailureWatch:
         if ports:
             self._on_failed(ports)
 
-    def give_up(self, ports: Iterable[str], waited_s: float) -> None:
-        """Name the owners of overdue ports, and stop waiting for them."""
+    def give_up(self, ports: Iterable[str], waited_s: float, stamp_ns: int) -> None:
+        """Name the owners of ports overdue in a tick, and stop waiting for them."""
         overdue = tuple(ports)
-        self.name(sorted({self._owners[port] for port in overdue}), waited_s)
+        self.name(sorted({self._owners[port] for port in overdue}), waited_s, stamp_ns)
         self._on_failed(overdue)
 
-    def name(self, nodes: Iterable[str], waited_s: float) -> None:
+    def name(self, nodes: Iterable[str], waited_s: float, stamp_ns: int = 0) -> None:
         """Publish that nodes did not answer."""
         reason = f"no answer within {waited_s:.1f} s"
+        by = self._node.get_fully_qualified_name()
         for node in nodes:
-            self._publisher.publish(failure(node, reason, self._node.get_fully_qualified_name()))
+            self._publisher.publish(failure(node, reason, by, stamp_ns))
 
 
 class TickWatch(FailureWatch):
@@ -113,7 +120,7 @@ class TickWatch(FailureWatch):
     def _check(self) -> None:
         if self._node.steady_s() - self._begun_s > self._timeout_s:
             overdue = [port for port in self._inbox.missing if port in self._owners]
-            self.give_up(overdue, self._timeout_s)
+            self.give_up(overdue, self._timeout_s, self._inbox.latest_ns)
 
     def _drop(self, ports: tuple[str, ...]) -> None:
         self._inbox.drop(ports)

@@ -45,6 +45,11 @@ class TickInbox(Generic[Item]):
         return min(self._ticks) if self._ticks else None
 
     @property
+    def latest_ns(self) -> int:
+        """Stamp of the tick at hand, or of the last one taken; 0 before the first."""
+        return max(self._taken_ns, 0) if self.stamp_ns is None else self.stamp_ns
+
+    @property
     def complete(self) -> bool:
         """Whether every awaited port of the earliest tick has been heard."""
         items = self._first

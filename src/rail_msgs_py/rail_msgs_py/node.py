@@ -17,6 +17,7 @@ from std_msgs.msg import String
 from rail_msgs_py import topics
 from rail_msgs_py.parameters import overrides
 from rail_msgs_py.stamps import to_time
+from rail_msgs_py.tap import raw_publish, tapped
 from rail_msgs_py.topic import Topic
 
 READY_POLL_S = 0.05
@@ -57,15 +58,14 @@ class CorridorMixin:
 
     def publisher(self: Any, topic: Topic, **parts: object) -> Any:
         """Publisher of a topic of the table."""
-        return self.create_publisher(topic.type, topic.name(**parts), topic.qos)
+        publisher = self.create_publisher(topic.type, topic.name(**parts), topic.qos)
+        return tapped(self.context, topic, publisher)
 
     def stream_out(self: Any, topic: Topic, **parts: object) -> Callable[[bytes], None]:
         """Function that publishes serialised messages to a reader that the tick waits for."""
         publisher = self.publisher(topic, **parts)
         self._connections.append(lambda: publisher.get_subscription_count() > 0)
-        # Straight to the handle: the bytes need none of the checks of Publisher.publish.
-        publish: Callable[[bytes], None] = publisher.handle.publish_raw
-        return publish
+        return raw_publish(publisher)
 
     def stream_in(
         self: Any, topic: Topic, callback: Callable[[bytes], None], **parts: object

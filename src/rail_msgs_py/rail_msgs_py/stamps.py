@@ -40,7 +40,7 @@ def clock_to_cdr(stamp_ns: int) -> bytes:
     return _CLOCK.pack(CDR_LITTLE_ENDIAN, sec, nanosec)
 
 
-def clock_from_cdr(raw: bytes) -> int:
+def clock_from_cdr(raw: bytes | memoryview) -> int:
     """Nanoseconds of a serialised ``rosgraph_msgs/Clock`` or of a leading ``std_msgs/Header``."""
     _, sec, nanosec = _CLOCK.unpack_from(raw)
     return int(sec) * NANOSECONDS + int(nanosec)

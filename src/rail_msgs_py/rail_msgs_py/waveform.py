@@ -34,6 +34,8 @@ _PREFIX = struct.Struct("<4sI I8sII I7sxII I3sxII II4x")
 _HEADER = struct.Struct("<4d")
 _STAMP = struct.Struct("<d")
 _DATA_AT = _PREFIX.size + _HEADER.size
+#: Where the stamp stands in the serialised form, a double: all that changes in a repeated block.
+STAMP_AT: Final = _PREFIX.size
 
 
 @dataclass(frozen=True, eq=False)

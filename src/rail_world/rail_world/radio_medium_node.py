@@ -187,7 +187,7 @@ class RadioMediumNode(CorridorNode):
         waited_s = self.steady_s() - self._stage_begun_s
         if waited_s > self._p.timeout_s:
             waiting = self._down if self._paths is None else self._up
-            self._watch.give_up(waiting.missing, self._p.timeout_s)
+            self._watch.give_up(waiting.missing, self._p.timeout_s, waiting.latest_ns)
 
     def _drop(self, ports: tuple[str, ...]) -> None:
         for inbox in (self._down, self._up):

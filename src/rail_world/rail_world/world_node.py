@@ -292,7 +292,7 @@ class WorldNode(CorridorNode):
             # Nothing of the tick may have come, so the inbox cannot tell the stamp by itself.
             stamp_ns = self._tick * self._tick_ns
             missing = self._inbox.missing
-            self._watch.give_up(missing, self._p.timeout_s)
+            self._watch.give_up(missing, self._p.timeout_s, stamp_ns)
             self.report(
                 DiagnosticStatus.ERROR,
                 "tick",

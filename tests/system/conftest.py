@@ -19,6 +19,8 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
+from rail_corridor.recorded_report import report_of
+from rail_corridor.recording_file import RecordingFile
 from rail_msgs_py.topic import Topic
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -106,6 +108,20 @@ class Rail:
         process = self.start("run", *arguments, "--report", path)
         assert self.finish(process) == 0, self.errors(process)
         report: dict[str, Any] = json.loads(path.read_text())
+        return report
+
+    def recorded(self, *arguments: object) -> dict[str, Any]:
+        """Run a corridor to its end and return its report, which its recording gives as well."""
+        path = self.directory / f"run_{len(self.started)}.mcap"
+        report = self.report(*arguments, "--record", path)
+        assert self.again(path) == report
+        return report
+
+    def again(self, recording: Path) -> dict[str, Any]:
+        """Return the report of a recording, which must be whole, computed from its messages."""
+        with RecordingFile(recording) as file:
+            report = report_of(file)
+        assert file.cut_at is None
         return report
 
     def processes(self) -> dict[int, str]:

@@ -21,9 +21,12 @@ pytestmark = pytest.mark.system
 def test_a_signal_ends_everything_and_leaves_a_report(
     rail: Rail, listener: Listener, number: signal.Signals
 ) -> None:
-    path = rail.directory / "report.json"
+    path, recording = rail.directory / "report.json", rail.directory / "run.mcap"
     clock = listener.listen(topics.CLOCK)
-    run = rail.start("run", "branch", "--rate", 5, "--processes", "site", "--report", path)
+    run = rail.start(
+        *("run", "branch", "--rate", 5, "--processes", "site"),
+        *("--report", path, "--record", recording),
+    )
     # The report acknowledges what it has read: from then on it is connected.
     observed = listener.listen(topics.OBSERVED)
     listener.until(lambda: observed)
@@ -37,18 +40,25 @@ def test_a_signal_ends_everything_and_leaves_a_report(
     assert set(report["trains"]) == {"train_a", "train_b"}
     assert not rail.processes()
     assert "Traceback" not in rail.errors(run)
+    assert rail.again(recording) == report
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_nothing_outlives_the_launcher(
     rail: Rail, wait_until: Callable[[Callable[[], Any]], Any], number: signal.Signals
 ) -> None:
-    run = rail.start("run", "branch", "--rate", 5, "--processes", "site")
-    wait_until(lambda: len(rail.processes()) >= 14 and len(rail.segments()) >= 14)
+    recording = rail.directory / "run.mcap"
+    run = rail.start("run", "branch", "--rate", 5, "--processes", "site", "--record", recording)
+    wait_until(lambda: len(rail.processes()) >= 15 and len(rail.segments()) >= 14)
+    wait_until(lambda: recording.stat().st_size > 500_000)
     segments = rail.segments()
     run.send_signal(number)
     run.wait()
     wait_until(lambda: not rail.processes())
+    # The recorder, the last to go, has completed its file.
+    report = rail.again(recording)
+    assert report["ticks"] > 1 and not report["complete"]
+    assert (report["wall_time_s"] is None) == (number == signal.SIGKILL)
     # What others had open up to the last moment goes with the next run.
     rail.report("plain_line", "--duration", 1, "--processes", "one")
     assert not rail.left_behind(segments)

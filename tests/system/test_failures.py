@@ -30,12 +30,12 @@ pytestmark = pytest.mark.system
 def test_a_killed_process_is_named_and_the_corridor_goes_on(
     rail: Rail, listener: Listener, process: str, node: str
 ) -> None:
-    path = rail.directory / "report.json"
+    path, recording = rail.directory / "report.json", rail.directory / "run.mcap"
     failed = listener.listen(topics.FAILED)
     clock = listener.listen(topics.CLOCK)
     run = rail.start(
         *("run", "branch", "--duration", 15, "--rate", 5, "--processes", "site"),
-        *("--report", path),
+        *("--report", path, "--record", recording),
     )
     listener.until(lambda: len(clock) > 10)
     (pid,) = (pid for pid, name in rail.processes().items() if name == process)
@@ -54,3 +54,5 @@ def test_a_killed_process_is_named_and_the_corridor_goes_on(
     assert "SIGKILL" in failure["reason"]
     assert node in rail.output(run)
     assert not rail.processes()
+    # All that it told others before is recorded.
+    assert rail.again(recording) == report

@@ -18,10 +18,8 @@ def test_every_threat_strikes_nothing_forged_is_taken_and_placement_does_not_mat
     rail: Rail,
 ) -> None:
     # The threats begin at 3 s.
-    reports = [
-        rail.report("hostile_network", "--duration", 7, "--processes", placement)
-        for placement in ("one", "site")
-    ]
+    scenario = ("hostile_network", "--duration", 7, "--processes")
+    reports = [rail.report(*scenario, "one"), rail.recorded(*scenario, "site")]
     assert reports[0]["digest"] == reports[1]["digest"]
     assert reports[0]["threats"] == reports[1]["threats"]
     assert reports[0]["processes"] == 1 < reports[1]["processes"]

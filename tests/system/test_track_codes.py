@@ -44,7 +44,7 @@ def test_a_heedless_driver_is_braked(rail: Rail) -> None:
 
 
 def test_a_train_that_loses_the_codes_stops_and_goes_on(rail: Rail) -> None:
-    report = rail.report("lost_codes")
+    report = rail.recorded("lost_codes")
     train = report["trains"]["train_a"]
     assert _is_safe(train)
     assert train["atp"]["interventions"] >= 1

@@ -23,6 +23,7 @@ MODULES = {
     "cbtc_ber": "cbtc",
     "doppler_solve": "doppler",
     "corridor_speed": "corridor",
+    "recording_cost": "corridor",
 }
 
 

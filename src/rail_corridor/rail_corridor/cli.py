@@ -13,8 +13,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import typer
 
+from .recording_commands import add_to as add_recordings
 from .study_commands import add_to as add_studies
-from .usage import ScenarioArgument, TrackOption, UsageError, check_choice, check_writable
+from .usage import (
+    ScenarioArgument,
+    TrackOption,
+    UsageError,
+    check_choice,
+    check_library,
+    check_writable,
+)
 
 app = typer.Typer(
     add_completion=False,
@@ -119,6 +127,10 @@ def run(
             "--kill", help="Kill this node at this simulated time; repeatable.", metavar="NODE@S"
         ),
     ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option("--record", help="Record every topic.", metavar="FILE.mcap"),
+    ] = None,
 ) -> None:
     """Run a corridor, and report."""
     import math
@@ -131,6 +143,9 @@ def run(
         raise UsageError(f"--timeout: {timeout}: must be from 0.5 to 3600 s")
     if report is not None:
         check_writable("--report", report)
+    if record is not None:
+        check_writable("--record", record)
+        check_library()
     from .kills import parse_kill
 
     kills = tuple(parse_kill(text) for text in kill or ())
@@ -142,7 +157,7 @@ def run(
     from .launcher import run as run_corridor
 
     options = RunOptions(  # type: ignore[arg-type]
-        rate, processes, only, report, timeout, tuple(external or ()), kills
+        rate, processes, only, report, timeout, tuple(external or ()), kills, record
     )
     raise typer.Exit(run_corridor(loaded, options, Console()))  # type: ignore[arg-type]
 
@@ -247,6 +262,7 @@ def bench(
 
 
 add_studies(app)
+add_recordings(app)
 
 
 def main() -> None:

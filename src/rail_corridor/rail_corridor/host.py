@@ -8,9 +8,12 @@ import os
 import signal
 import threading
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .node_spec import NodeSpec
+
+if TYPE_CHECKING:
+    from rail_msgs_py.tap import Tap
 
 #: Kind of node -> module and class; the ament packages name the same modules.
 NODE_CLASSES = {
@@ -80,14 +83,21 @@ def make_nodes(specs: Sequence[NodeSpec], context: Any) -> list[Any]:
     return nodes
 
 
-def run_nodes(specs: Sequence[NodeSpec]) -> None:
-    """Make nodes in this process and spin them until SIGTERM."""
+def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None) -> None:
+    """Make nodes in this process and spin them until SIGTERM.
+
+    Parameters
+    ----------
+    specs : sequence of NodeSpec
+    tap : Tap, optional
+        Is told of everything that they publish.
+    """
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
     from rail_msgs_py.standalone import spin
 
-    context = rclpy.Context()
+    context = make_context(tap)
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     nodes = make_nodes(specs, context)
     try:
@@ -96,6 +106,15 @@ def run_nodes(specs: Sequence[NodeSpec]) -> None:
         for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown(context=context)
+
+
+def make_context(tap: Tap | None) -> Any:
+    """Context of the nodes of a process."""
+    import rclpy
+
+    from rail_msgs_py.tap import TappedContext
+
+    return rclpy.Context() if tap is None else TappedContext(tap)
 
 
 def die_with(lifeline: int) -> None:

@@ -9,24 +9,36 @@ import signal
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+from .bystander import FULL_NAME as BYSTANDER
+from .bystander import Bystander
 from .domain import sole_corridor
-from .host import make_nodes, node_class, run_nodes
+from .errors import InputError
+from .host import make_context, make_nodes, node_class, run_nodes
 from .kills import Executioner, Kill, check_kills
 from .middleware import discover_on
 from .plan import WORLD, Placement, Plan, check_external, make_plan
 from .processes import ProcessGroup, remove_orphaned_segments
-from .report import make_report, print_report, write_report
+from .recorder_frames import Attachment
+from .report import make_report, print_report, report_text, write_report
+from .run_facts import BEGIN, END, Beginning, Ending
 from .scenario import Scenario
+from .scenario_files import files_of
+
+if TYPE_CHECKING:
+    from .node_spec import NodeSpec
+    from .run_recording import RunRecording
 
 #: More processes than this to a core cost more than they show.
 MOST_PROCESSES_PER_CORE = 8
 #: Wall time to read what is still under way when the world has finished.
 DRAIN_S = 20.0
+#: ... and where some of it will not come, as its sender has failed or the run was stopped.
+SETTLE_S = 0.3
 
 
 @dataclass(frozen=True)
@@ -40,6 +52,12 @@ class RunOptions:
     timeout_s: float = 30.0
     external: tuple[str, ...] = ()
     kills: tuple[Kill, ...] = ()
+    record: Path | None = None
+
+    @property
+    def with_strangers(self) -> bool:
+        """Whether somebody else runs some of the nodes."""
+        return bool(self.external or self.only)
 
 
 def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
@@ -48,8 +66,11 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
     Returns
     -------
     int
-        Exit code: 0, 1 if the world itself failed, 128 + the number of the signal that ended it.
+        Exit code: 0, 1 if the world itself or the recorder failed, 128 + the number of the signal
+        that ended it.
     """
+    if options.record is not None:
+        _check_recording(options.record, options.only)
     discover_on("all" if options.only else "this")
     directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
     try:
@@ -59,12 +80,24 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
             rate=options.rate,
             timeout_s=options.timeout_s,
             external=options.external,
+            bystanders=(BYSTANDER,) if options.record and options.with_strangers else (),
         )
         check_external(plan, options.external)
         with sole_corridor(options.only):
             return _Run(scenario, options, plan, console).run()
     finally:
         shutil.rmtree(directory, ignore_errors=True)
+
+
+def _check_recording(path: Path, only: str | None) -> None:
+    """Raise InputError for a recording that cannot be made."""
+    if path.suffix != ".mcap":
+        reason = "the name of a recording ends in .mcap"
+    elif only == "onboard":
+        reason = "record where the world runs, with --only wayside"
+    else:
+        return
+    raise InputError(reason, field="--record", value=str(path))
 
 
 def default_placement(plan: Plan, cores: int | None = None) -> Placement:
@@ -88,7 +121,8 @@ class _Run:
         if placement != "one":
             self._here.clear()
         check_kills(options.kills, self._groups, WORLD, one=bool(self._here))
-        self._processes = ProcessGroup()
+        self._recording: RunRecording | None = None
+        self._recording_failed = False
         self._signal = 0
         self._world_failed = False
         self._observer: Any = None
@@ -101,6 +135,8 @@ class _Run:
             for kind in {spec.kind for spec in specs}:
                 node_class(kind)
         nodes = sum(len(specs) for specs in self._groups.values())
+        if self._options.record is not None:
+            self._recording = self._record(self._options.record, nodes)
         plural = "process" if len(self._groups) == 1 else "processes"
         self._console.print(
             f"[bold]{self._plan.scenario}[/bold]: {nodes} nodes in {len(self._groups)} {plural}, "
@@ -108,20 +144,44 @@ class _Run:
         )
         for name in self._options.external:
             self._console.print(f"waiting for {name}, which somebody else runs")
+        # After the recorder, which would hold the other processes to life.
+        self._processes = ProcessGroup()
         previous = {
             number: signal.signal(number, self._on_signal)
             for number in (signal.SIGINT, signal.SIGTERM)
         }
         try:
             for name, specs in self._groups.items() if not self._here else ():
-                self._processes.start(name, lambda specs=specs: run_nodes(specs))
+                self._processes.start(name, lambda name=name, specs=specs: self._child(name, specs))
             self._watch()
         finally:
             self._processes.stop()
             remove_orphaned_segments(besides=os.getpid())  # ROS is shut down here by now
+            try:
+                report = self._report(nodes)
+            finally:
+                self._end_recording()
             for number, handler in previous.items():
                 signal.signal(number, handler)
-        return self._finish(nodes)
+        return self._finish(report)
+
+    def _child(self, name: str, specs: list[NodeSpec]) -> None:
+        """In a process of its own: run nodes, and tell the recorder what they publish."""
+        run_nodes(specs, self._recording.tap_of(name) if self._recording else None)
+
+    def _record(self, path: Path, nodes: int) -> RunRecording:
+        """Start the recorder, before any other process and before ROS."""
+        from .run_recording import RunRecording
+
+        plan = self._plan
+        beginning = Beginning(plan.scenario, plan.seed, nodes, len(self._groups))
+        return RunRecording(
+            path,
+            () if self._here else self._groups,
+            files_of(self._scenario),
+            {BEGIN: beginning.values()},
+            strangers=self._options.with_strangers,
+        )
 
     def _on_signal(self, number: int, frame: Any) -> None:
         self._signal = number
@@ -139,7 +199,8 @@ class _Run:
 
         from .observer import Observer
 
-        context = rclpy.Context()
+        tap = self._recording.start() if self._recording else None
+        context = make_context(tap)
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
         self._stop = Future()
         tracks = tuple(self._scenario.tracks)
@@ -151,6 +212,12 @@ class _Run:
             record=self._options.only != "onboard",
         )
         nodes = [self._observer, *make_nodes(self._here, context)]
+        if tap is not None and self._options.with_strangers:
+            ours = {spec.name for specs in self._groups.values() for spec in specs}
+            others = [spec.name for spec in self._plan.nodes if spec.name not in ours]
+            from .run_recording import SHARED
+
+            nodes.append(Bystander(others, tap.open, SHARED, context=context))
         executor = EventsExecutor(context=context)
         for node in nodes:
             executor.add_node(node)
@@ -200,23 +267,29 @@ class _Run:
         )
 
     def _drain(self, executor: Any) -> None:
-        """Read what was sent before the end."""
+        """Read what was sent before the end; of a run that was stopped, its last whole tick."""
         from rclpy.task import Future
 
-        if self._signal or self._world_failed or self._options.only == "onboard":
+        if self._options.only == "onboard":
             return
         observer = self._observer
+        stopped = bool(self._signal) or self._world_failed
+        ticks = observer.finished_ticks
+        if ticks is None:
+            ticks = max(observer.tick - 1, 0)
+            observer.recording.end_at(ticks)
+        limit_s = SETTLE_S if stopped or observer.failures else DRAIN_S
         done = Future()
 
         def poll() -> None:
             waited_s = observer.steady_s() - started_s
-            if (observer.complete or waited_s > DRAIN_S) and not done.done():
+            if (observer.intake.complete(ticks) or waited_s > limit_s) and not done.done():
                 done.set_result(None)
 
         started_s = observer.steady_s()
-        if not observer.complete and not observer.failures:
+        if not observer.intake.complete(ticks):
             observer.every(0.01, poll)
-            executor.spin_until_future_complete(done, timeout_sec=DRAIN_S + 1.0)
+            executor.spin_until_future_complete(done, timeout_sec=limit_s + 1.0)
 
     def _on_progress(self) -> None:
         """Ten times a second: look after the processes and the bar."""
@@ -225,32 +298,61 @@ class _Run:
             for spec in self._groups[child.name]:
                 observer.announce_failure(spec.name, f"process {child.ended}")
                 self._world_failed |= spec.name == WORLD
+        if self._recording is not None and not self._recording_failed:
+            self._tell_trouble(self._recording.trouble(), "; the run goes on")
         if stop.done():
             return
         if observer.finished_ticks is not None or self._world_failed or self._signal:
             stop.set_result(None)
         if self._progress is None or self._bar is None or not observer.tick:
             return
+        intake = observer.intake
         sim_s = observer.tick * self._plan.tick_s
-        elapsed_s = observer.last_tick_s - observer.first_tick_s
+        elapsed_s = intake.last_tick_s - intake.first_tick_s
         speed = f"{sim_s / elapsed_s:.0f} x real time" if elapsed_s > 0.5 else ""
         self._progress.update(self._bar, description="running", completed=sim_s, speed=speed)
 
-    def _finish(self, nodes: int) -> int:
-        interrupted = bool(self._signal) or self._world_failed
-        if self._options.only != "onboard":
-            report = make_report(
-                self._scenario,
-                self._plan,
-                self._observer,
-                nodes=nodes,
-                processes=len(self._groups),
-                interrupted=interrupted,
-            )
+    def _tell_trouble(self, trouble: str | None, so: str = "") -> None:
+        if trouble is not None:
+            self._recording_failed = True
+            line = f"recording to {self._options.record} has failed: {trouble}{so}"
+            self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)
+
+    def _report(self, nodes: int) -> dict[str, Any] | None:
+        """What the run showed, None where the report is made on another host."""
+        if self._options.only == "onboard" or self._observer is None:
+            return None
+        report = make_report(
+            self._scenario,
+            self._plan,
+            self._observer.intake,
+            nodes=nodes,
+            processes=len(self._groups),
+            interrupted=bool(self._signal) or self._world_failed,
+        )
+        if self._recording is not None and not self._recording_failed:
+            ending = Ending(report["complete"], report["ticks"], report["wall_time_s"])
+            file = Attachment("report.json", "application/json", report_text(report).encode())
+            self._recording.tell([file], {END: ending.values()})
+        return report
+
+    def _end_recording(self) -> None:
+        if self._recording is None:
+            return
+        trouble = self._recording.finish()
+        if not self._recording_failed:
+            self._tell_trouble(trouble)
+
+    def _finish(self, report: dict[str, Any] | None) -> int:
+        if report is not None:
             print_report(report, self._console)
             if self._options.report is not None:
                 write_report(report, self._options.report)
                 self._console.print(f"report written to {self._options.report}")
+        if self._recording is not None and not self._recording_failed:
+            self._console.print(f"recorded to {self._options.record}")
         if self._world_failed:
             return 1
-        return 128 + self._signal if self._signal else 0
+        if self._signal:
+            return 128 + self._signal
+        return 1 if self._recording_failed else 0

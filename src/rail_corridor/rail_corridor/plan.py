@@ -103,8 +103,12 @@ def make_plan(
     observed: bool = True,
     timeout_s: float = 30.0,
     external: Iterable[str] = (),
+    bystanders: Iterable[str] = (),
 ) -> Plan:
-    """Plan a run; writes the world file into ``run_directory``."""
+    """Plan a run; writes the world file into ``run_directory``.
+
+    The world waits for the nodes of the plan, and for ``bystanders``, which are not in it.
+    """
     layout = scenario.layout
     seeds = np.random.SeedSequence([scenario.seed, 2]).spawn(max(1, len(scenario.trains)))
     transponders = {
@@ -145,7 +149,7 @@ def make_plan(
         "world_file": str(world_path),
         "ticks": scenario.ticks,
         "rate": float(rate),
-        "nodes": tuple(spec.name for spec in others),
+        "nodes": (*(spec.name for spec in others), *bystanders),
         "sinks": tuple(sinks),
         "clock_readers": len(
             {CONTROLLER, *(spec.name for spec in others if spec.kind in clocked)} - {*external}

@@ -115,6 +115,10 @@ class ProcessGroup:
         for child in self._alive():
             _, status = os.waitpid(child.pid, 0)
             child.ended = _how(status)
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the pipe that ties the children to this process, as a sibling of them must."""
         for end in (self._read_end, self._write_end):
             with contextlib.suppress(OSError):
                 os.close(end)

@@ -47,10 +47,10 @@ class ReportsTaken:
         """Store the reports [report, column] of one tick."""
         self._rows[train][tick] = rows
 
-    def of(self, train: int) -> Iterator[tuple[int, FloatArray]]:
-        """Tick and columns of each report of a train, in the order of their taking."""
+    def of(self, train: int, ticks: int) -> Iterator[tuple[int, FloatArray]]:
+        """Tick and columns of each report of a train in the first ticks, as they were taken."""
         for tick, rows in sorted(self._rows[train].items()):
-            for row in rows:
+            for row in rows if tick < ticks else ():
                 yield tick, row
 
     def have(self, tick: int) -> bool:
@@ -125,11 +125,18 @@ class Recording:
         self.links = Record(len(trains), len(LINK_COLUMNS))
         self.channel = Record(len(trains), 2 + channels)
         self.position = Record(len(trains), len(POSITION_COLUMNS))
+        self._most_ticks: int | None = None
 
     @property
     def ticks(self) -> int:
         """Ticks whose truth has been received."""
-        return self.state.ticks
+        if self._most_ticks is None:
+            return self.state.ticks
+        return min(self.state.ticks, self._most_ticks)
+
+    def end_at(self, ticks: int) -> None:
+        """Leave out what came after so many ticks: a run that was stopped was amid a tick."""
+        self._most_ticks = ticks
 
     @property
     def estimates(self) -> tuple[Record, ...]:

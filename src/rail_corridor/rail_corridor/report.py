@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,8 @@ from rich.table import Table
 
 from .cbtc_metrics import cbtc_metrics
 from .code_metrics import code_metrics
+from .intake import Intake
 from .metrics import train_metrics
-from .observer import Observer
 from .plan import Plan
 from .positioning_metrics import positioning_metrics
 from .scenario import Scenario
@@ -25,17 +26,24 @@ _MOST_EVENTS_SHOWN = 8
 def make_report(
     scenario: Scenario,
     plan: Plan,
-    observer: Observer,
+    intake: Intake,
     *,
     nodes: int,
     processes: int,
     interrupted: bool,
 ) -> dict[str, Any]:
-    """Report of what an observer has recorded."""
-    recording = observer.recording
+    """Report of what has been read of a run, while it went or from a file.
+
+    The wall time is None where nobody has measured it.
+    """
+    recording = intake.recording
     ticks = recording.ticks
-    wall_s = max(observer.last_tick_s - observer.first_tick_s, 0.0) if ticks else 0.0
+    wall_s: float | None = intake.last_tick_s - intake.first_tick_s if ticks else 0.0
+    if wall_s is not None:
+        wall_s = None if math.isnan(wall_s) else max(wall_s, 0.0)
     sim_s = ticks * plan.tick_s
+    # Of a run that was stopped, what happened after the last whole tick is left out.
+    end_s = sim_s if interrupted else math.inf
     trains = {}
     for index, name in enumerate(recording.trains):
         section = train_metrics(scenario, recording, index)
@@ -54,23 +62,28 @@ def make_report(
         "ticks": ticks,
         "sim_time_s": round(sim_s, 9),
         "wall_time_s": wall_s,
-        "real_time_factor": sim_s / wall_s if wall_s > 0.0 else None,
+        "real_time_factor": sim_s / wall_s if wall_s else None,
         "nodes": nodes,
         "processes": processes,
         "complete": not interrupted,
         "missing_ticks": recording.missing_ticks,
         "digest": recording.digest(),
-        "failures": observer.failures,
-        "events": [event for event in observer.events if event["level"] != "ok"],
+        "failures": intake.failures,
+        "events": [e for e in intake.events if e["level"] != "ok" and e["time_s"] < end_s],
         **threats,
         "trains": trains,
     }
 
 
+def report_text(report: dict[str, Any]) -> str:
+    """The report as JSON."""
+    return json.dumps(report, indent=2, allow_nan=False) + "\n"
+
+
 def write_report(report: dict[str, Any], path: Path) -> None:
     """Write the report so that a reader finds the old one or the new one, never half of one."""
     draft = path.with_name(f".{path.name}.{os.getpid()}")
-    draft.write_text(json.dumps(report, indent=2, allow_nan=False) + "\n")
+    draft.write_text(report_text(report))
     draft.replace(path)
 
 
@@ -97,9 +110,11 @@ def print_report(report: dict[str, Any], console: Console) -> None:
     _print_positions(report["trains"], console)
     factor = report["real_time_factor"]
     speed = f"{factor:.1f} times real time, " if factor else ""
+    wall_s = report["wall_time_s"]
+    wall = "" if wall_s is None else f" in {wall_s:.1f} s"
     console.print(
-        f"{report['ticks']} ticks, {report['sim_time_s']:.1f} s simulated in "
-        f"{report['wall_time_s']:.1f} s: {speed}{report['nodes']} nodes in "
+        f"{report['ticks']} ticks, {report['sim_time_s']:.1f} s simulated{wall}: "
+        f"{speed}{report['nodes']} nodes in "
         f"{report['processes']} {'process' if report['processes'] == 1 else 'processes'}",
         soft_wrap=True,
     )

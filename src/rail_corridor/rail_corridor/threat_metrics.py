@@ -78,7 +78,7 @@ def report_metrics(scenario: Scenario, recording: Recording, index: int) -> dict
     taken = forged = 0
     newest = -1
     oldest_s = max(1.0, 3.0 * scenario.tick_s) + _SAME_S
-    for tick, row in recording.reports.of(index):
+    for tick, row in recording.reports.of(index, recording.ticks):
         taken += 1
         sealed_s = row[_REPORT["sealed_s"]]
         then = round(sealed_s / scenario.tick_s)

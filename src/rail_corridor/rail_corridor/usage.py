@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 from pathlib import Path
 from typing import Annotated
@@ -35,3 +36,9 @@ def check_choice(option: str, value: str | None, choices: tuple[str, ...]) -> No
     """Raise UsageError if a value is none of those that are offered; None is no value."""
     if value is not None and value not in choices:
         raise UsageError(f"{option}: {value!r}: must be one of {', '.join(choices)}")
+
+
+def check_library() -> None:
+    """Raise UsageError where recordings can be neither written nor read."""
+    if importlib.util.find_spec("mcap") is None:
+        raise UsageError("recordings need the Python package mcap")

@@ -1,0 +1,181 @@
+"""A run of one train made up of messages, and its recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.serialization import deserialize_message, serialize_message
+
+from rail_corridor.intake import Intake
+from rail_corridor.mcap_recorder import McapRecorder, Source
+from rail_corridor.plan import Plan, make_plan
+from rail_corridor.recorded_report import report_of
+from rail_corridor.recorder_frames import (
+    ATTACHMENT,
+    CHANNEL,
+    MESSAGE,
+    METADATA,
+    Attachment,
+    ChannelInfo,
+    attachment_frame,
+    channel_frame,
+    metadata_frame,
+)
+from rail_corridor.recording_file import RecordingFile
+from rail_corridor.report import make_report, report_text
+from rail_corridor.run_facts import BEGIN, END, Beginning, Ending
+from rail_corridor.scenario import Overrides, Scenario, load_scenario
+from rail_corridor.scenario_files import files_of
+from rail_msgs_py import topics
+from rail_msgs_py.failures import failure
+from rail_msgs_py.headers import header_to_cdr
+from rail_msgs_py.message_definition import type_name
+from rail_msgs_py.position import Position, PositionWriter
+from rail_msgs_py.qos_text import offered_profiles
+from rail_msgs_py.stamps import clock_to_cdr, to_time
+from rail_msgs_py.table import TableWriter
+from rail_msgs_py.topic import Topic
+
+TRAIN = "train_a"
+TICKS = 60
+NODES, PROCESSES = 9, 3
+
+
+class Said(NamedTuple):
+    """One message on a topic."""
+
+    topic: Topic
+    name: str
+    raw: bytes
+
+
+def _situation(directory: Path) -> tuple[Scenario, Plan]:
+    """Return the scenario and plan of the run."""
+    scenario = load_scenario("plain_line", overrides=Overrides(duration_s=TICKS * 0.1))
+    return scenario, make_plan(scenario, directory)
+
+
+def _health(stamp_ns: int, name: str, level: bytes, message: str) -> bytes:
+    array = DiagnosticArray(status=[DiagnosticStatus(level=level, name=name, message=message)])
+    for key, value in to_time(stamp_ns).items():
+        setattr(array.header.stamp, key, value)
+    return bytes(serialize_message(array))
+
+
+def _messages(plan: Plan, ticks: int = TICKS) -> Iterator[Said]:
+    """Yield what is said in so many ticks."""
+    rng = np.random.default_rng(3)
+    state = TableWriter((TRAIN,), topics.STATE_COLUMNS)
+    links = TableWriter((TRAIN,), topics.LINK_COLUMNS)
+    channels = {a.downlink_channel for a in plan.world.radio.stations}
+    channel = TableWriter((TRAIN,), tuple(f"c{n}" for n in range(2 + len(channels))))
+    position = PositionWriter(TRAIN, "main")
+    here = {name: index for index, name in enumerate(topics.STATE_COLUMNS)}
+    for tick in range(ticks):
+        ns, way_m = tick * plan.world.tick_ns, 20.0 + 2.0 * tick
+        figures = np.zeros((1, len(here)))
+        figures[0, [here["path_m"], here["x_m"], here["chainage_m"]]] = way_m
+        figures[0, [here["speed_mps"], here["on_line"]]] = 20.0, 1.0
+        yield Said(topics.STATE, topics.STATE.name(), state.write(ns, figures))
+        yield Said(topics.CLOCK, topics.CLOCK.name(), clock_to_cdr(ns))
+        row = np.array([[1.0, 2.0, -50.0, *[-90.0] * (len(channels) - 1)]])
+        yield Said(topics.VRS_CHANNEL, topics.VRS_CHANNEL.name(train=TRAIN), channel.write(ns, row))
+        known = tick % 9 != 4
+        told = Position(
+            *(ns, TRAIN, "main", way_m + 0.2 * rng.standard_normal()),
+            *(0.04 if known else math.inf, 20.0, 1.0),
+        )
+        raw = position.write(told)
+        yield Said(topics.POSITION, topics.POSITION.name(train=TRAIN), raw)
+        snr = np.array([[900.0, 1100.0, 1.0, 2.0]])
+        yield Said(topics.LINKS, topics.LINKS.name(), links.write(ns, snr))
+        if tick == 30:
+            for by in ("/world/radio_medium", "the launcher"):
+                raw = bytes(serialize_message(failure("/wayside/wrs3", "silent", by, ns)))
+                yield Said(topics.FAILED, "/failed", raw)
+        if tick % 20 == 7:
+            for name in ("/wayside/wrs1: zone1", "/train_a/vrs: ranging"):
+                raw = _health(ns, name, DiagnosticStatus.WARN, f"jammed at {tick}")
+                yield Said(topics.DIAGNOSTICS, "/diagnostics", raw)
+    if ticks == TICKS:
+        yield Said(topics.FINISHED, "/world/finished", header_to_cdr((ticks - 1) * 100_000_000))
+
+
+def _heard(plan: Plan, scenario: Scenario, said: list[Said]) -> Intake:
+    """Return an intake that has heard all of this, as a live one would."""
+    intake = Intake(plan, tuple(scenario.tracks))
+    readers = {reader.name: reader for reader in intake.readers}
+    for topic, name, raw in said:
+        if name in readers:
+            reader = readers[name]
+            reader.take(raw if reader.raw else deserialize_message(raw, topic.type))
+    intake.first_tick_s, intake.last_tick_s = 0.0, 2.625
+    return intake
+
+
+def _write(
+    path: Path,
+    scenario: Scenario,
+    said: list[Said],
+    report: dict[str, Any] | None = None,
+    *,
+    files: list[Attachment] | None = None,
+) -> None:
+    """Record these messages; with the report of the run, if it came to one."""
+    beginning = {BEGIN: Beginning(scenario.name, scenario.seed, NODES, PROCESSES).values()}
+    with path.open("wb") as stream:
+        recorder = McapRecorder(stream, files_of(scenario) if files is None else files, beginning)
+        source, numbers = Source(), {}
+        for topic, name, raw in said:
+            if name not in numbers:
+                numbers[name] = len(numbers) + 1
+                info = ChannelInfo(name, type_name(topic.type), offered_profiles(topic.qos))
+                frame = memoryview(channel_frame(numbers[name], info))[7:]
+                recorder.take(source, CHANNEL, numbers[name], frame)
+            recorder.take(source, MESSAGE, numbers[name], memoryview(raw))
+        if report is not None:
+            file = Attachment("report.json", "application/json", report_text(report).encode())
+            recorder.take(source, ATTACHMENT, 0, memoryview(attachment_frame(file))[7:])
+            end = Ending(report["complete"], report["ticks"], report["wall_time_s"])
+            recorder.take(source, METADATA, 0, memoryview(metadata_frame(END, end.values()))[7:])
+        recorder.close()
+
+
+class MadeUpRun:
+    """A run: what was said, and the report made while it went."""
+
+    def __init__(self, directory: Path, ticks: int = TICKS, ending: int | None = None) -> None:
+        self.path = directory / "run.mcap"
+        self.scenario, self.plan = _situation(directory)
+        self.said = list(_messages(self.plan, ticks))
+        intake = _heard(self.plan, self.scenario, self.said)
+        if ending is not None:
+            intake.recording.end_at(ending)
+        self.report = make_report(
+            self.scenario,
+            self.plan,
+            intake,
+            nodes=NODES,
+            processes=PROCESSES,
+            interrupted=ending is not None,
+        )
+
+    def write(self, said: list[Any] | None = None, *, whole: bool = True, **more: Any) -> None:
+        report = self.report if whole else None
+        _write(self.path, self.scenario, said or self.said, report, **more)
+
+    def reported(self) -> dict[str, Any]:
+        with RecordingFile(self.path) as file:
+            return report_of(file)
+
+
+@pytest.fixture
+def made_up(tmp_path: Path) -> Callable[..., MadeUpRun]:
+    """Return what makes up a run: of so many ticks, the report of which ends at one of them."""
+    return lambda **more: MadeUpRun(tmp_path, **more)

@@ -241,6 +241,9 @@ def test_a_line_between_its_points_is_the_curve() -> None:
     place, slope, _ = line.at(s)
     assert np.hypot(place[:, 0] - x, place[:, 1] - y).max() < 1e-4
     np.testing.assert_allclose(slope[:, 0], np.cos(heading), atol=1e-4)
+    # One point at a time it is the same, past its ends too.
+    for at_m in (-10.0, 0.0, 1499.3, 1623.7, line.end_m, line.end_m + 10.0):
+        np.testing.assert_allclose(line.frame(at_m), np.ravel(line.at(at_m)), atol=1e-12)
     # Past its ends it goes on straight.
     beyond, _, _ = line.at([-10.0])
     np.testing.assert_allclose(beyond, [[-10.0, 0.0, 0.0]], atol=1e-9)

@@ -31,6 +31,7 @@ from scipy.special import chdtri
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.doppler_line import SurveyedLine
 from rail_signals.doppler_plan import TonePlan
+from rail_signals.doppler_refine import Heard, ShiftCost, Symmetric, inverse
 from rail_signals.ranging_signal import FloatArray
 
 #: A second minimum is another answer unless it is so much less likely: exp(-25 / 2).
@@ -39,12 +40,7 @@ _CLEARLY_WORSE = 25.0
 _MOVING_SIGMAS = 5.0
 #: Probability that a right answer is refused as inconsistent.
 _MISFIT_RISK = 1e-6
-_MOST_STEPS = 12
 _MOST_CANDIDATES = 4
-# A step of Gauss and Newton leaves its square over the distance of the nearest station.
-_STEP_M, _STEP_MPS = 0.02, 1e-3
-_MOST_STEP_M = 20.0
-_DIAGONAL = np.arange(3)
 #: The cost may differ by so much from its parabola two sigma away, where that is 4.
 _BENT = 1.0
 
@@ -230,7 +226,7 @@ class DopplerSolver:
         if measured.standing <= least + _MOVING_SIGMAS**2:
             return Answer(Reason.STANDSTILL)
         order = minima[np.argsort(cost[minima])][:_MOST_CANDIDATES]
-        found = measured.refine(places_m[order], v[order], (low_m, high_m))
+        found = measured.refine(places_m[order].tolist(), v[order].tolist(), (low_m, high_m))
         if direction:
             found = [f for f in found if f.speed_mps * direction > 0.0]
         if not found:
@@ -263,14 +259,20 @@ class _Measured:
         offset: Prior | None,
         speed: Prior | None,
     ) -> None:
-        self._line, self._stations_m = solver.line, solver.stations_m[number]
-        self._tau_s = solver.plan.averaging_time_s
         self._z, self._w = z, weight
         self._a, self._b = solver._per_mps[number], solver._scale[number]
         self._informed = (offset is not None) + (speed is not None)
         self._offset = offset or solver._widest
         self._speed = speed or Prior(0.0, 2.0 * solver.plan.max_speed_mps)
         self._wo, self._wv = self._offset.sigma**-2, self._speed.sigma**-2
+        columns = (*solver.stations_m[number].T, z, weight, self._a, self._b)
+        self.cost = ShiftCost(
+            solver.line,
+            [Heard(*row) for row in np.stack(columns, axis=1).tolist()],
+            solver.plan.averaging_time_s,
+            (self._speed.mean, self._wv),
+            (self._offset.mean, self._wo),
+        )
         # The offset of a train that stands. What it leaves is small where the shifts are not,
         # and so are the sums of what follows, which would otherwise cancel.
         self._s22 = float(weight @ self._b**2) + self._wo
@@ -299,79 +301,33 @@ class _Measured:
         v = force / weight
         return self.standing - v * force, v
 
-    def refine(self, s: FloatArray, v: FloatArray, window_m: tuple[float, float]) -> list[Fix]:
-        """Minima near places [n] at speeds [n], the best first; none that leaves the window."""
-        if not s.size:
-            return []
-        theta = np.stack([s, v, np.full_like(s, self._offset.mean)], axis=1)
-        prior = np.array([0.0, self._wv, self._wo])
-        mean = np.array([0.0, self._speed.mean, self._offset.mean])
-        for _ in range(_MOST_STEPS):
-            left, rows = self._left(theta)
-            weighted = rows * self._w[:, None]
-            normal = np.matmul(weighted.transpose(0, 2, 1), rows)
-            normal[:, _DIAGONAL, _DIAGONAL] += prior
-            off = mean - theta
-            force = np.matmul(left[:, None, :], weighted)[:, 0] + prior * off
-            step = np.linalg.solve(normal, force[..., None])[..., 0]
-            # What the cost will be, as far as it is a parabola.
-            cost = (left * left) @ self._w + (off * off) @ prior - (force * step).sum(axis=1)
-            # No farther than where the rates keep their shape, and not far off the line.
-            step *= np.minimum(1.0, _MOST_STEP_M / np.maximum(np.abs(step[:, :1]), 1e-9))
-            theta = theta + step
-            small = (np.abs(step[:, 0]) < _STEP_M) & (np.abs(step[:, 1]) < _STEP_MPS)
-            outside = (theta[:, 0] < window_m[0]) | (theta[:, 0] > window_m[1])
-            theta[outside, 0] = np.clip(theta[outside, 0], *window_m)
-            best = np.where(small & ~outside, cost, inf).min()
-            if (small | outside | (cost > best + 2.0 * _CLEARLY_WORSE)).all():
-                break
-        kept = np.flatnonzero(small & ~outside)
-        if not kept.size:
-            return []
-        covariance = np.linalg.inv(normal[kept])
-        cost = self._cost(theta[kept])
-        return [
-            Fix(
-                float(theta[kept[n], 0]),
-                float(theta[kept[n], 1]),
-                float(theta[kept[n], 2]),
-                covariance[n],
-                float(cost[n]),
-                self._z.size + self._informed - 3,
+    def refine(
+        self, places_m: list[float], speeds_mps: list[float], window_m: tuple[float, float]
+    ) -> list[Fix]:
+        """Minima near places at speeds, the best first; none that leaves the window."""
+        found = []
+        best = inf
+        for s, v in zip(places_m, speeds_mps, strict=True):
+            here = self.cost.minimum(
+                (s, v, self._offset.mean), window_m, best + 2.0 * _CLEARLY_WORSE
             )
-            for n in np.argsort(cost).tolist()
-        ]
+            if here is not None:
+                found.append(here)
+                best = min(best, here.cost)
+        found.sort(key=lambda minimum: minimum.cost)
+        freedom = self._z.size + self._informed - 3
+        return [Fix(*m.at, _full(inverse(m.normal)), m.cost, freedom) for m in found]
 
     def bent(self, fix: Fix) -> bool:
         """Whether the cost is no parabola within two sigma, so that the covariance misleads."""
-        away = 2.0 * fix.covariance[:, 0] / fix.sigma_m
-        centre = np.array([fix.chainage_m, fix.speed_mps, fix.offset_hz])
-        rise = self._cost(np.stack([centre + away, centre - away])) - fix.misfit
-        return bool((np.abs(rise - 4.0) > _BENT).any())
+        ds, dv, dd = (2.0 / fix.sigma_m * fix.covariance[0]).tolist()
+        s, v, delta = fix.chainage_m, fix.speed_mps, fix.offset_hz
+        sides = (s + ds, v + dv, delta + dd), (s - ds, v - dv, delta - dd)
+        return any(abs(self.cost(side) - fix.misfit - 4.0) > _BENT for side in sides)
 
-    def _left(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What the model leaves of the shifts [n, station], and its derivatives [n, station, 3]."""
-        s, v, delta = theta.T
-        way = v * self._tau_s
-        # The two instants that stand for the block.
-        rates, bends = self._line.rates_and_bends(self._stations_m, np.stack([s - way, s + way]))
-        mean = 0.5 * (rates[0] + rates[1])
-        speed = v[:, None]
-        rows = np.empty((*mean.shape, 3))
-        rows[..., 0] = self._a * speed * 0.5 * (bends[0] + bends[1])
-        rows[..., 1] = self._a * (mean + 0.5 * way[:, None] * (bends[1] - bends[0]))
-        rows[..., 2] = self._b
-        left = self._z - self._a * speed * mean - self._b * delta[:, None]
-        return left, rows
 
-    def _cost(self, theta: FloatArray) -> FloatArray:
-        """Cost [n] at [n, 3]."""
-        left, _ = self._left(theta)
-        return np.asarray(
-            (left * left) @ self._w
-            + self._wv * (theta[:, 1] - self._speed.mean) ** 2
-            + self._wo * (theta[:, 2] - self._offset.mean) ** 2
-        )
+def _full(c: Symmetric) -> FloatArray:
+    return np.array([[c[0], c[1], c[2]], [c[1], c[3], c[4]], [c[2], c[4], c[5]]])
 
 
 def speed_from_shift(

@@ -174,6 +174,41 @@ def test_supervision_brakes_without_a_code_and_releases_with_one(graph: Any) -> 
     assert lost[-1]["service_brake"] == 1.0
 
 
+def test_supervision_judges_the_fastest_that_a_localizer_allows(graph: Any) -> None:
+    code = graph.sender(topics.CODE_RECEIVED, train="train_1")
+    odometer = graph.sender(topics.ODOMETER, train="train_1")
+    localizer = graph.sender(topics.LOCALIZER_STATE, train="train_1")
+    box = graph.mailbox(topics.COMMAND, train="train_1", supervision="code_supervision")
+    parameters = {"localizer": True}
+    node = CodeSupervisionNode(namespace="/train_1", context=graph.context, parameters=parameters)
+    node.switch_on()
+    graph.add(node)
+    graph.connect("/train_1/code_supervision")
+    columns = topics.RECEIVED_COLUMNS, topics.ODOMETER_COLUMNS, topics.LOCALIZER_COLUMNS
+    codes, wheels, places = (TableWriter(("train_1",), names) for names in columns)
+    values = dict.fromkeys(topics.RECEIVED_COLUMNS, 0.0) | {"carrier_hz": 1700.0, "valid": 1.0}
+    values |= FIELDS
+    heard = np.array([[values[name] for name in topics.RECEIVED_COLUMNS]], dtype=float)
+
+    def tick(number: int, believed_mps: float, fastest_mps: float) -> dict[str, float]:
+        place = dict.fromkeys(topics.LOCALIZER_COLUMNS, 0.0)
+        place |= {"low_m": -1.0, "high_m": 1.0, "speed_mps": believed_mps}
+        place |= {"speed_low_mps": -0.1, "speed_high_mps": fastest_mps}
+        code(codes.write(number * TICK_NS, heard))
+        odometer(wheels.write(number * TICK_NS, np.array([[0.0, 0.0]])))  # they stand still
+        row = np.array([[place[name] for name in topics.LOCALIZER_COLUMNS]])
+        localizer(places.write(number * TICK_NS, row))
+        graph.wait(lambda: len(box) > number)
+        return rows(box)
+
+    permitted_mps = 70.0 / 3.6  # the entrance is not known: the end speed
+    slow = tick(0, 0.0, 0.5)
+    assert slow["service_brake"] == 0.0
+    # The driver is shown less by what he may be faster than he believes.
+    assert slow["permitted_mps"] == pytest.approx(permitted_mps - 0.5)
+    assert tick(1, 19.0, 26.0)["emergency_brake"] == 1.0
+
+
 def to_ns_of(message: Any) -> int:
     return Table.from_msg(message).stamp_ns
 

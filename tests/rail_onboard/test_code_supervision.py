@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -151,6 +152,38 @@ def test_the_entrance_is_where_the_old_carrier_was_last_surely_heard() -> None:
         ride = entered(code(160.0, 0.0))
         ride.at_m = run_m[silent_s]
         assert permitted == pytest.approx(ride.tick(code(160.0, 0.0), 2300.0).permitted_mps)
+
+
+def test_a_localizer_counts_where_it_knows_both_places() -> None:
+    """Wheels that slide count nothing; half-widths at entrance and place come off what is left."""
+    fields = code(80.0, 0.0, 500.0)
+    speed_mps, half_m, step_s = 20.0, 3.0, 0.1
+
+    def permitted(knows: Callable[[float], bool]) -> float:
+        supervision = CodeSupervision()
+        at_m = -100.0
+        for tick in range(140):
+            at_m += speed_mps * step_s
+            entered = at_m > 0.0
+            out = supervision.update(
+                tick * step_s,
+                0.0,  # the wheels stand still
+                speed_mps,
+                fields=fields if entered else OPEN,
+                carrier_hz=2300.0 if entered else 1700.0,
+                located_m=(at_m - half_m, at_m + half_m) if knows(at_m) else None,
+            )
+        return out.permitted_mps
+
+    ride = entered(fields, speed_mps, odometer_error=0.0)
+    notice_m = DELAYS.notice_s * speed_mps
+    ride.at_m += 178.0 + 2.0 * half_m + notice_m
+    wanted = ride.tick(fields, 2300.0, 0.0).permitted_mps
+    assert permitted(lambda at_m: True) == pytest.approx(wanted, abs=0.2)
+    blind = permitted(lambda at_m: False)
+    assert blind > permitted(lambda at_m: True) + 1.0
+    # Known at the entrance only, or here only: the odometer counts.
+    assert permitted(lambda at_m: at_m < 50.0) == permitted(lambda at_m: at_m > 50.0) == blind
 
 
 def test_crosstalk_makes_no_entrance() -> None:

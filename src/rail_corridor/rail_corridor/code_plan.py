@@ -25,7 +25,8 @@ def code_nodes(scenario: Scenario, world_file: str, timeout_s: float) -> list[No
         parameters = _transmitter(scenario, plan, circuit, timeout_s / 5)
         name = f"/wayside/{circuit.name}/track_code"
         nodes.append(NodeSpec("track_code_transmitter", name, "wayside", parameters))
-    for train in scenario.supervised:
+    for described in scenario.trains if scenario.supervised else ():
+        train = described.name
         receiver = {
             "profile": TRACK_CODE,
             "carriers_hz": plan.carriers_hz,
@@ -34,6 +35,8 @@ def code_nodes(scenario: Scenario, world_file: str, timeout_s: float) -> list[No
         supervision = {
             "braking_mps2": plan.braking_mps2,
             "odometer_error": _ODOMETER_SIGMAS * plan.odometer_error,
+            "localizer": scenario.localizer is not None,
+            "direction": described.direction,
             "timeout_s": 3 * timeout_s / 5,
         }
         nodes += [

@@ -74,6 +74,6 @@ LOCALIZER_STATE: Final = Topic(
     ESTIMATE,
     Table,
     "localizer",
-    "atp, people, the report",
+    "atp, code_supervision, people, the report",
     "Front of the train from all sensors, its protection level, and which sensors are excluded.",
 )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite, nan
+from math import inf, nan
 from typing import Any
 
 import numpy as np
@@ -26,11 +26,11 @@ from rail_msgs_py.train_channel import train_end
 from rail_onboard.authority_supervision import AuthoritySupervision
 from rail_onboard.braking_curve import GuaranteedBraking
 from rail_onboard.code_supervision import SupervisionOutput, Thresholds
+from rail_onboard.located import located
 from rail_onboard.train_location import NOWHERE, Location, TrainLocation
 from rail_onboard.train_protection import TrainIdentity, TrainProtection
 
 _ODOMETER, _RADIO, _LOCALIZER = "odometer", "radio", "localizer"
-_LOCATED = {name: index for index, name in enumerate(topics.LOCALIZER_COLUMNS)}
 _NOT_TOLD = (nan, nan, inf)
 _OFF = SupervisionOutput(0.0, True, True, True, "switched off")
 
@@ -174,12 +174,16 @@ class AtpNode(Equipment):
         heard = items.get(_RADIO)
         frames = heard.in_slot(self._p.number) if heard else []
         protection = self._protection
-        located, doubt_mps = None, 0.0
+        place, doubt_mps = None, 0.0
         if self._p.localizer:
-            located, speed_mps, doubt_mps = _located(items.get(_LOCALIZER), speed_mps)
+            known = located(items.get(_LOCALIZER))
+            place = NOWHERE
+            if known is not None:
+                place = Location(known.low_m + known.half_m, known.half_m, True)
+                speed_mps, doubt_mps = known.fastest_mps, known.doubt_mps
         out, sent = _OFF, []
         if self.switched_on:
-            out = protection.tick(stamp_ns, distance_m, speed_mps, frames, located)
+            out = protection.tick(stamp_ns, distance_m, speed_mps, frames, place)
             sent = [(self._p.number, protection.frame(stamp_ns, speed_mps))]
         self._tell(telegrams(stamp_ns, sent))
         if self._p.localizer:
@@ -197,23 +201,6 @@ class AtpNode(Equipment):
             out.reason or "running",
             stamp_ns=stamp_ns,
         )
-
-
-def _located(figures: list[float] | None, wheels_mps: float) -> tuple[Location, float, float]:
-    """Where a localizer says that the front is, the fastest that the train may run, the doubt.
-
-    The doubt is by how much that is above the speed that is believed [m/s].
-    """
-    if figures is None:
-        return NOWHERE, wheels_mps, 0.0
-    low_m, high_m = figures[_LOCATED["low_m"]], figures[_LOCATED["high_m"]]
-    if not (isfinite(low_m) and isfinite(high_m)):
-        return NOWHERE, wheels_mps, 0.0
-    bounds = (figures[_LOCATED["speed_low_mps"]], figures[_LOCATED["speed_high_mps"]])
-    fastest_mps = max(abs(bound) for bound in bounds)
-    half_m = 0.5 * (high_m - low_m)
-    doubt_mps = max(0.0, fastest_mps - abs(figures[_LOCATED["speed_mps"]]))
-    return Location(low_m + half_m, half_m, True), fastest_mps, doubt_mps
 
 
 def main() -> None:

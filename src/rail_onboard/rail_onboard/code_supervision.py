@@ -10,6 +10,7 @@ brakes act, comes down to the end speed e in what is left of the block with the 
 and never less than e, for which no braking is needed. The worst is assumed throughout: the
 entrance was passed when the old carrier was last surely heard, the odometer counts too little, a
 fall adds to ``a``. In a new block the end speed of the old one holds until its first valid code.
+Where a localizer knows the train at both places, d is the most that its intervals allow instead.
 """
 
 from __future__ import annotations
@@ -124,6 +125,20 @@ class SupervisionOutput:
     reason: str
 
 
+@dataclass(frozen=True)
+class _Place:
+    """A place by the odometer [m], and the least and the most of the way by a localizer [m]."""
+
+    odometer_m: float
+    located_m: tuple[float, float] | None
+
+    def run_m(self, start: _Place, odometer_error: float) -> float:
+        """The most that the train can have run since a place."""
+        if self.located_m is not None and start.located_m is not None:
+            return max(0.0, self.located_m[1] - start.located_m[0])
+        return max(0.0, self.odometer_m - start.odometer_m) * (1.0 + odometer_error)
+
+
 class CodeSupervision:
     """Speed supervision as a state machine; depends on nothing but what it is fed.
 
@@ -179,8 +194,8 @@ class CodeSupervision:
         self._code_s = -inf  # when it was last valid, or its successor was due
         self._carrier_hz: float | None = None
         self._awaiting = False  # in a new block, without its code
-        self._entry_m: float | None = None  # odometer at the entrance of the block; None = unknown
-        self._before: deque[tuple[float, float]] = deque()  # (time, odometer), carrier in force
+        self._entry: _Place | None = None  # the entrance of the block; None = unknown
+        self._before: deque[tuple[float, _Place]] = deque()  # times and places, carrier in force
         self._lost: tuple[float, float] | None = None  # time and speed when the code was lost
         self._service = True
         self._emergency = False
@@ -194,6 +209,8 @@ class CodeSupervision:
         *,
         fields: Mapping[str, int] | None = None,
         carrier_hz: float | None = None,
+        located_m: tuple[float, float] | None = None,
+        fastest_mps: float | None = None,
     ) -> SupervisionOutput:
         """One tick.
 
@@ -207,6 +224,11 @@ class CodeSupervision:
             Fields of the valid code understood on ``carrier_hz``, None = none in this tick.
         carrier_hz : float, optional
             Carrier in force in the rails, None = none is heard [Hz].
+        located_m : (float, float), optional
+            Least and most of the way by a localizer, of any origin; it grows with the travel [m].
+        fastest_mps : float, optional
+            The fastest that the train may run, by a localizer; the odometer then only tells whether
+            it stands.
         """
         if time_s < self._time_s:
             self.reset()
@@ -215,40 +237,42 @@ class CodeSupervision:
             self._service = self._emergency = True
             return SupervisionOutput(0.0, True, True, True, "no odometer")
         speed_mps = abs(speed_mps)
-        self._follow(time_s, distance_m, speed_mps, carrier_hz)
+        fastest = speed_mps if fastest_mps is None else fastest_mps
+        place = _Place(distance_m, located_m)
+        self._follow(time_s, place, speed_mps, carrier_hz)
         if fields is not None and carrier_hz is not None:
             self._take(time_s, self._scales.read(fields))
         lost = self._overdue(time_s)
-        permitted_mps = self._permitted_mps(distance_m)
+        permitted_mps = self._permitted_mps(place)
         if not lost:
             self._lost = None
         else:
             if self._lost is None:
-                self._lost = time_s, speed_mps
+                self._lost = time_s, fastest
             permitted_mps = min(permitted_mps, self._stopping_mps(time_s))
-        return self._judge(speed_mps, permitted_mps, lost=lost)
+        return self._judge(fastest, speed_mps <= STANDSTILL_MPS, permitted_mps, lost=lost)
 
     def _follow(
-        self, time_s: float, distance_m: float, speed_mps: float, carrier_hz: float | None
+        self, time_s: float, place: _Place, speed_mps: float, carrier_hz: float | None
     ) -> None:
         """Notice the entrance of a block by its carrier."""
         if carrier_hz is None:
             return
         if self._carrier_hz is not None and carrier_hz != self._carrier_hz:
-            entry_m = self._before[0][1]
+            entry = self._before[0][1]
             # A block is at least as long as coded: a change before that, or a second one
             # without a code, is crosstalk, and then no entrance is known.
-            believed = not self._awaiting and self._left_m(distance_m) <= 0.0
+            believed = not self._awaiting and self._left_m(place) <= 0.0
             if believed and self._code is not None and self._code.end_mps <= 0.0:
                 self._passed_stop |= speed_mps > STANDSTILL_MPS
-            self._entry_m = entry_m if believed else None
+            self._entry = entry if believed else None
             if not (self._awaiting or self._overdue(time_s)):
                 # The new code is given its time once: flicker must not put it off for ever.
                 self._code_s = time_s
             self._awaiting = True
             self._before.clear()
         self._carrier_hz = carrier_hz
-        self._before.append((time_s, distance_m))
+        self._before.append((time_s, place))
         while len(self._before) > 1 and self._before[1][0] <= time_s - self._delays.notice_s:
             self._before.popleft()
 
@@ -258,7 +282,7 @@ class CodeSupervision:
         if old is not None and not self._awaiting:
             same = (code.length_m, code.gradient_permil) == (old.length_m, old.gradient_permil)
             # Another block without a change of carrier: two entrances went by unnoticed.
-            self._entry_m = self._entry_m if same else None
+            self._entry = self._entry if same else None
         self._code, self._code_s, self._awaiting = code, time_s, False
 
     def _overdue(self, time_s: float) -> bool:
@@ -266,14 +290,14 @@ class CodeSupervision:
         # The response time itself is within it, however the ticks are rounded.
         return self._code is None or time_s - self._code_s > self._delays.response_s + 1e-9
 
-    def _left_m(self, distance_m: float) -> float:
+    def _left_m(self, place: _Place) -> float:
         """What is left of the block at the worst; nothing where its entrance is not known."""
-        if self._code is None or self._entry_m is None:
+        if self._code is None or self._entry is None:
             return 0.0
-        run_m = max(0.0, distance_m - self._entry_m) * (1.0 + self._odometer_error)
+        run_m = place.run_m(self._entry, self._odometer_error)
         return max(0.0, self._code.length_m - run_m)
 
-    def _permitted_mps(self, distance_m: float) -> float:
+    def _permitted_mps(self, place: _Place) -> float:
         """Speed permitted by the code at a place of its block; no bound if there was none."""
         code = self._code
         if code is None:
@@ -285,7 +309,7 @@ class CodeSupervision:
             return code.end_mps
         t = self._delays.brake_s
         a = self._delays.traction_mps2 + max(0.0, -GRAVITY_MPS2 * 1e-3 * code.gradient_permil)
-        left_m = self._left_m(distance_m)
+        left_m = self._left_m(place)
         w = -b * t + sqrt((b * t) ** 2 + code.end_mps**2 + 2.0 * b * left_m + a * b * t**2)
         curve_mps = w - a * t - self._thresholds.service_over_mps
         return min(code.now_mps, max(code.end_mps, curve_mps))
@@ -298,7 +322,9 @@ class CodeSupervision:
         b = max(deceleration_mps2(self._braking_mps2, gradient_permil), LEAST_BRAKING_MPS2)
         return max(0.0, speed_mps - b * max(0.0, time_s - since_s - self._delays.brake_s))
 
-    def _judge(self, speed_mps: float, permitted_mps: float, *, lost: bool) -> SupervisionOutput:
+    def _judge(
+        self, speed_mps: float, stands: bool, permitted_mps: float, *, lost: bool
+    ) -> SupervisionOutput:
         """Warn, brake or release."""
         limits = self._thresholds
         too_fast = speed_mps > permitted_mps + limits.service_over_mps
@@ -307,7 +333,7 @@ class CodeSupervision:
         if lost or stop or too_fast:
             self._service = True
         elif speed_mps <= below:
-            if speed_mps <= STANDSTILL_MPS:
+            if stands:
                 self._emergency = self._passed_stop = False
             self._service = self._emergency
         if self._passed_stop or speed_mps > limits.emergency_mps(permitted_mps):

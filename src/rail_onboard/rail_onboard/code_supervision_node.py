@@ -1,6 +1,7 @@
 """Speed supervision of a train: obeys the code in the rails, brakes where the driver does not.
 
-Topics in: ``track_code/message``, ``odometer``. Topics out: ``command``.
+Topics in: ``track_code/message``, ``odometer``, with a localizer its ``state``. Topics out:
+``command``.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter, figures_from_cdr
 from rail_onboard.code_supervision import CodeSupervision
+from rail_onboard.located import located
 
-_CODE, _ODOMETER = "code", "odometer"
+_CODE, _ODOMETER, _LOCALIZER = "code", "odometer", "localizer"
 _RECEIVED = {name: index for index, name in enumerate(topics.RECEIVED_COLUMNS)}
 _FIELDS = ("speed", "gradient", "block_length", "network")
 
@@ -36,6 +38,10 @@ class CodeSupervisionParameters:
     odometer_error: float = parameter(
         0.02, "relative error of distances that must be allowed for", low=0.0, high=0.5
     )
+    localizer: bool = parameter(
+        False, "whether a localizer tells place and speed; where it knows none, the odometer does"
+    )
+    direction: int = parameter(1, "1 or -1: towards greater or smaller chainages", low=-1, high=1)
     timeout_s: float = parameter(
         2.0, "wall time after which the receiver is given up", unit="s", low=0.05, high=3600.0
     )
@@ -61,11 +67,12 @@ class CodeSupervisionNode(Equipment):
         train = namespace.strip("/")
         self._publish = self.stream_out(topics.COMMAND, train=train, supervision=self.get_name())
         self._table = TableWriter((train,), topics.COMMAND_COLUMNS)
-        self._inbox: TickInbox[Any] = TickInbox([_CODE, _ODOMETER])
-        receiver = topics.CODE_RECEIVED.owner(train=train)
-        self._watch = TickWatch(
-            self, self._inbox, {_CODE: receiver}, self._p.timeout_s, self._advance
-        )
+        owners = {_CODE: topics.CODE_RECEIVED.owner(train=train)}
+        if self._p.localizer:
+            owners[_LOCALIZER] = topics.LOCALIZER_STATE.owner(train=train)
+            self.stream_in(topics.LOCALIZER_STATE, self._on_located, train=train)
+        self._inbox: TickInbox[Any] = TickInbox([_ODOMETER, *owners])
+        self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
         self.stream_in(topics.CODE_RECEIVED, self._on_code, train=train)
         self.stream_in(topics.ODOMETER, self._on_odometer, train=train)
         self.announce_when_connected()
@@ -79,6 +86,11 @@ class CodeSupervisionNode(Equipment):
         stamp_ns, figures = figures_from_cdr(raw, 1, len(topics.ODOMETER_COLUMNS))
         self._inbox.put(stamp_ns, _ODOMETER, figures[0].tolist())
         self._watch.begin()
+        self._advance()
+
+    def _on_located(self, raw: bytes) -> None:
+        stamp_ns, figures = figures_from_cdr(raw, 1, len(topics.LOCALIZER_COLUMNS))
+        self._inbox.put(stamp_ns, _LOCALIZER, figures[0].tolist())
         self._advance()
 
     def _advance(self) -> None:
@@ -96,12 +108,24 @@ class CodeSupervisionNode(Equipment):
             if code[_RECEIVED["valid"]] > 0.0:
                 fields = {name: round(code[_RECEIVED[name]]) for name in _FIELDS}
         distance_m, speed_mps = odometer
+        way_m, fastest_mps, doubt_mps = None, None, 0.0
+        known = located(items.get(_LOCALIZER))
+        if known is not None:
+            way_m = known.travelled(self._p.direction)
+            fastest_mps, doubt_mps = known.fastest_mps, known.doubt_mps
         output = self._supervision.update(
-            stamp_ns * 1e-9, distance_m, speed_mps, fields=fields, carrier_hz=carrier_hz
+            stamp_ns * 1e-9,
+            distance_m,
+            speed_mps,
+            fields=fields,
+            carrier_hz=carrier_hz,
+            located_m=way_m,
+            fastest_mps=fastest_mps,
         )
         emergency = output.emergency_brake or not self.switched_on
         figures = [
-            output.permitted_mps,
+            # The driver keeps to it by his own speed, supervision judges the fastest it may be.
+            max(0.0, output.permitted_mps - doubt_mps),
             float(output.warning),
             float(output.service_brake),
             float(emergency),

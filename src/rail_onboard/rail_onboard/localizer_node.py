@@ -155,7 +155,7 @@ class LocalizerNode(Equipment):
         self._watch = TickWatch(self, self._inbox, owners, p.timeout_s, self._advance)
         self._tell = (
             self.stream_out(topics.LOCALIZER_STATE, train=train)
-            if p.told
+            if p.told or p.joints_m  # train protection or code supervision waits for it
             else (self.publisher(topics.LOCALIZER_STATE, train=train).publish)
         )
         self._table = TableWriter((train,), topics.LOCALIZER_COLUMNS)

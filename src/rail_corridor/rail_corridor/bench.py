@@ -22,6 +22,7 @@ MODULES = {
     "track_code_decode": "track_code",
     "cbtc_ber": "cbtc",
     "doppler_solve": "doppler",
+    "train_bus_traces": "train_bus",
     "corridor_speed": "corridor",
     "recording_cost": "corridor",
 }

@@ -23,6 +23,7 @@ from .usage import (
     check_library,
     check_writable,
 )
+from .workshop_commands import add_to as add_workshop
 
 app = typer.Typer(
     add_completion=False,
@@ -263,6 +264,7 @@ def bench(
 
 add_studies(app)
 add_recordings(app)
+add_workshop(app)
 
 
 def main() -> None:

@@ -26,6 +26,8 @@ setup(
             "atp = rail_onboard.atp_node:main",
             "doppler_positioner = rail_onboard.doppler_positioner_node:main",
             "localizer = rail_onboard.localizer_node:main",
+            "bus_terminal = rail_onboard.bus_terminal_node:main",
+            "train_bus_monitor = rail_onboard.train_bus_monitor_node:main",
         ],
     },
 )

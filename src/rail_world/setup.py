@@ -25,6 +25,7 @@ setup(
             "cbtc_medium = rail_world.cbtc_medium_node:main",
             "backbone = rail_world.backbone_node:main",
             "reference_medium = rail_world.reference_medium_node:main",
+            "bus_medium = rail_world.bus_medium_node:main",
         ],
     },
 )

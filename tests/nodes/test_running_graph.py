@@ -13,7 +13,7 @@ from rail_corridor.observer import Observer
 from rail_corridor.plan import NodeSpec, make_plan
 from rail_corridor.scenario import Overrides, load_scenario
 from rail_corridor.topic_docs import PARAMETERS, document, main, type_name
-from rail_msgs_py import cbtc_topics, positioning_topics, topics
+from rail_msgs_py import bus_topics, cbtc_topics, positioning_topics, topics
 from rail_msgs_py.topic import Topic
 from rail_msgs_py.topics import ALL, kind_of
 
@@ -25,11 +25,14 @@ RAILS = [
 ]
 THREATS = [topics.BACKBONE_DOWN, topics.BACKBONE_UP, topics.STRIKES]
 PLACES = [topic for topic in vars(positioning_topics).values() if isinstance(topic, Topic)]
+BUS = [topic for topic in vars(bus_topics).values() if isinstance(topic, Topic)]
+SUPERVISION = [topics.ODOMETER, topics.COMMAND]
 #: Scenarios with every kind of node between them, and the topics that each does without.
 SCENARIOS = {
-    "follow_codes": [*RADIO, *PLACES],
-    "hostile_network": [*RAILS, *PLACES],
-    "located_block": [*RAILS, *THREATS],
+    "follow_codes": [*RADIO, *PLACES, *BUS],
+    "hostile_network": [*RAILS, *PLACES, *BUS],
+    "located_block": [*RAILS, *THREATS, *BUS],
+    "failing_bus": [*RADIO, *RAILS, *SUPERVISION, *PLACES, *THREATS],
 }
 #: What rclpy itself offers beside the corridor's topics.
 ROS_OWN = ("/rosout", "/parameter_events")

@@ -35,6 +35,7 @@ PARTS = {
     "base": ("base1", "wrs1", "b"),
     "station": ("ref1", "wrs1", "r"),
     "supervision": ("atp", "code_supervision"),
+    "end": ("head", "tail"),
     "node": ("/world/radio_medium", "/wayside/zone_controller"),
 }
 FIELDS = {name: value for name, value in vars(topics).items() if isinstance(value, Topic)}

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from rail_world.description import Chainage, Description, Name, Number
 from rail_world.threat_description import LONGEST_DELAY_S, LongestDelay, Rate, Threats
 
+from .bus_fault_section import BusFault
 from .section_fields import ChannelNumber, Power, Time
 
 
@@ -119,6 +120,7 @@ Fault = Annotated[
     | NetworkThreats
     | DeadReference
     | DetunedReference
-    | WheelSlip,
+    | WheelSlip
+    | BusFault,
     Field(discriminator="kind"),
 ]

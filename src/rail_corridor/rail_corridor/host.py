@@ -38,12 +38,16 @@ NODE_CLASSES = {
     "reference_station": ("rail_wayside.reference_station_node", "ReferenceStationNode"),
     "doppler_positioner": ("rail_onboard.doppler_positioner_node", "DopplerPositionerNode"),
     "localizer": ("rail_onboard.localizer_node", "LocalizerNode"),
+    "bus_medium": ("rail_world.bus_medium_node", "BusMediumNode"),
+    "bus_terminal": ("rail_onboard.bus_terminal_node", "BusTerminalNode"),
+    "train_bus_monitor": ("rail_onboard.train_bus_monitor_node", "TrainBusMonitorNode"),
 }
 #: Kinds whose name is a parameter of the scenario rather than of the class.
 _NAMED = {
     *("wrs", "vrs", "track_code_transmitter", "track_code_receiver", "code_supervision"),
     *("cbtc_base_station", "cbtc_radio", "atp", "reference_station"),
     *("doppler_positioner", "localizer"),
+    *("bus_terminal", "train_bus_monitor"),
 }
 #: With more nodes than this in a process the parameter services are left out.
 MOST_NODES_WITH_SERVICES = 12

@@ -76,6 +76,7 @@ class Intake:
         channels = len({antenna.downlink_channel for antenna in radio.stations})
         rails = plan.world.rails
         circuits = () if rails is None else tuple(circuit.name for circuit in rails.circuits)
+        bus = plan.world.bus
         self.recording = Recording(
             radio.trains,
             tracks,
@@ -85,6 +86,7 @@ class Intake:
             threatened=bool(plan.world.threats),
             references=plan.world.references is not None,
             localizer=any(spec.kind == "localizer" for spec in plan.nodes),
+            buses=() if bus is None else tuple(each.train for each in bus.trains),
         )
         self._failures: dict[str, tuple[float, str, str]] = {}
         self._events: list[dict[str, Any]] = []
@@ -100,6 +102,7 @@ class Intake:
         self._read_codes()
         self._read_authorities()
         self._read_positions()
+        self._read_buses()
 
     @property
     def failures(self) -> list[dict[str, Any]]:
@@ -175,6 +178,15 @@ class Intake:
             if recording.localizer:
                 self._read_row(recording.located, topics.LOCALIZER_STATE, index, train=train)
 
+    def _read_buses(self) -> None:
+        recording = self.recording
+        for index, train in enumerate(recording.buses):
+            self._read_row(recording.bus_head, topics.BUS_LINK, index, train=train, end="head")
+            self._read_row(recording.bus_tail, topics.BUS_LINK, index, train=train, end="tail")
+            self._read_row(recording.bus_state, topics.BUS_STATE, index, train=train)
+        if recording.buses:
+            self._read(topics.BUS_LINKS, self._table(recording.bus_links, len(recording.buses)))
+
     def _read_command(self, index: int, train: str, supervision: str) -> None:
         command = self.recording.command
         self._read_row(command, topics.COMMAND, index, train=train, supervision=supervision)
@@ -188,11 +200,12 @@ class Intake:
 
         self._read(topic, take, **parts)
 
-    def _table(self, record: Record) -> Callable[[bytes], None]:
-        """Reader of tables with a row per train."""
+    def _table(self, record: Record, rows: int | None = None) -> Callable[[bytes], None]:
+        """Reader of whole tables, with a row per train unless told otherwise."""
+        count = len(self.recording.trains) if rows is None else rows
 
         def take(raw: bytes) -> None:
-            stamp_ns, figures = figures_from_cdr(raw, len(self.recording.trains), record.columns)
+            stamp_ns, figures = figures_from_cdr(raw, count, record.columns)
             self._put(record, stamp_ns, slice(None), figures)
 
         return take

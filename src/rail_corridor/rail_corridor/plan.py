@@ -14,6 +14,8 @@ import numpy as np
 from rail_world.radio import THERMAL_NOISE_DBM_PER_HZ
 from rail_world.world_file import WorldFile
 
+from .bus_plan import CLOCKED as BUS_CLOCKED
+from .bus_plan import bus_nodes
 from .calibration import Transponder, calibrate
 from .cbtc_plan import cbtc_nodes, controller_parameters
 from .code_plan import code_nodes
@@ -137,12 +139,13 @@ def make_plan(
         *code_nodes(scenario, str(world_path), timeout_s),
         *cbtc_nodes(scenario, str(world_path), timeout_s),
         *positioning_nodes(scenario, str(world_path), timeout_s),
+        *bus_nodes(scenario, str(world_path), timeout_s),
     ]
     others = [medium, controller, *equipment, *more]
     sinks = [MEDIUM, CONTROLLER, *(spec.name for spec in more if spec.side == "world")]
     clocked = {
         *("wrs", "track_code_transmitter", "cbtc_base_station", "cbtc_radio", "backbone"),
-        "reference_station",
+        *("reference_station", *BUS_CLOCKED),
     }
     supervision = scenario.supervision
     parameters = {

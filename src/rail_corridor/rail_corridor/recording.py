@@ -75,6 +75,8 @@ class Recording:
         Whether a backbone with threats carries their telegrams.
     references, localizer : bool
         Whether trains find their place by Doppler shifts, and from all sensors.
+    buses : tuple of str
+        Trains that have a train bus.
     """
 
     def __init__(
@@ -88,7 +90,9 @@ class Recording:
         threatened: bool = False,
         references: bool = False,
         localizer: bool = False,
+        buses: tuple[str, ...] = (),
     ) -> None:
+        from rail_msgs_py.bus_topics import BUS_LINK_COLUMNS, BUS_LINKS_COLUMNS, BUS_STATE_COLUMNS
         from rail_msgs_py.topics import (
             ATP_COLUMNS,
             AUTHORITY_COLUMNS,
@@ -121,6 +125,11 @@ class Recording:
         self.references, self.localizer = references, localizer
         self.doppler = Record(len(trains), len(DOPPLER_COLUMNS))
         self.located = Record(len(trains), len(LOCALIZER_COLUMNS))
+        self.buses = buses
+        self.bus_head = Record(len(buses), len(BUS_LINK_COLUMNS))
+        self.bus_tail = Record(len(buses), len(BUS_LINK_COLUMNS))
+        self.bus_state = Record(len(buses), len(BUS_STATE_COLUMNS))
+        self.bus_links = Record(len(buses), len(BUS_LINKS_COLUMNS))
         self.state = Record(len(trains), len(STATE_COLUMNS))
         self.links = Record(len(trains), len(LINK_COLUMNS))
         self.channel = Record(len(trains), 2 + channels)
@@ -150,6 +159,8 @@ class Recording:
             records.append(self.doppler)
         if self.localizer:
             records.append(self.located)
+        if self.buses:
+            records += [self.bus_head, self.bus_tail, self.bus_state]
         return tuple(records)
 
     @property

@@ -11,6 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from .bus_metrics import bus_metrics, print_buses
 from .cbtc_metrics import cbtc_metrics
 from .code_metrics import code_metrics
 from .intake import Intake
@@ -54,6 +55,8 @@ def make_report(
         if recording.cbtc:
             section |= cbtc_metrics(scenario, recording, index)
         section |= positioning_metrics(scenario, recording, index)
+        if name in recording.buses:
+            section |= bus_metrics(scenario, recording, recording.buses.index(name))
         trains[name] = section
     threats = {"threats": threat_metrics(recording)} if recording.threatened else {}
     return {
@@ -108,6 +111,7 @@ def print_report(report: dict[str, Any], console: Console) -> None:
     _print_authorities(report["trains"], console)
     _print_threats(report, console)
     _print_positions(report["trains"], console)
+    print_buses(report["trains"], console)
     factor = report["real_time_factor"]
     speed = f"{factor:.1f} times real time, " if factor else ""
     wall_s = report["wall_time_s"]

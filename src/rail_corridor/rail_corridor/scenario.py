@@ -22,6 +22,7 @@ from rail_world.description import (
 from rail_world.network import Network, build_network
 
 from .base_stations import Base, place_bases
+from .bus_section import BusPlan
 from .cbtc_section import CbtcPlan
 from .circuits import Circuit, place_circuits
 from .errors import InputError, from_validation
@@ -87,6 +88,9 @@ class Scenario(Description):
     )
     localizer: LocalizerPlan | None = Field(
         default=None, description="position on board from all sensors; null = none"
+    )
+    train_bus: BusPlan | None = Field(
+        default=None, description="the bus in the trains and what watches it; null = none"
     )
     trains: tuple[TrainDescription, ...] = Field(
         default=(), max_length=100, description="trains one by one"

@@ -11,6 +11,7 @@ from rail_world.description import TrainDescription
 from rail_world.errors import WorldDataError
 from rail_world.motion import TrainMotion
 
+from .bus_checks import check_bus
 from .cbtc_checks import check_cbtc
 from .code_checks import check_codes
 from .errors import InputError, from_world
@@ -68,6 +69,7 @@ def check_scenario(scenario: Scenario, train_fields: Sequence[str]) -> None:
     check_codes(scenario, train_fields)
     check_cbtc(scenario, train_fields)
     check_positioning(scenario, train_fields)
+    check_bus(scenario)
 
 
 def _check_zone_lengths(scenario: Scenario, layout: Layout) -> None:

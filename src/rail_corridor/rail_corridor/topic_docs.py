@@ -15,11 +15,13 @@ from rail_msgs_py import topics
 from rail_msgs_py.message_definition import type_name
 from rail_msgs_py.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
 from rail_onboard.atp_node import AtpParameters
+from rail_onboard.bus_terminal_node import BusTerminalParameters
 from rail_onboard.cbtc_radio_node import CbtcRadioParameters
 from rail_onboard.code_supervision_node import CodeSupervisionParameters
 from rail_onboard.doppler_positioner_node import DopplerPositionerParameters
 from rail_onboard.localizer_node import LocalizerParameters
 from rail_onboard.track_code_receiver_node import TrackCodeReceiverParameters
+from rail_onboard.train_bus_monitor_node import TrainBusMonitorParameters
 from rail_onboard.vrs_node import VrsParameters
 from rail_wayside.cbtc_base_station_node import CbtcBaseStationParameters
 from rail_wayside.reference_station_node import ReferenceStationParameters
@@ -27,6 +29,7 @@ from rail_wayside.track_code_transmitter_node import TrackCodeTransmitterParamet
 from rail_wayside.wrs_node import WrsParameters
 from rail_wayside.zone_controller_node import ZoneControllerParameters
 from rail_world.backbone_node import BackboneParameters
+from rail_world.bus_medium_node import BusMediumParameters
 from rail_world.cbtc_medium_node import CbtcMediumParameters
 from rail_world.radio_medium_node import RadioMediumParameters
 from rail_world.rail_medium_node import RailMediumParameters
@@ -53,6 +56,9 @@ PARAMETERS: dict[str, Any] = {
     "reference_station": ReferenceStationParameters,
     "doppler_positioner": DopplerPositionerParameters,
     "localizer": LocalizerParameters,
+    "bus_medium": BusMediumParameters,
+    "bus_terminal": BusTerminalParameters,
+    "train_bus_monitor": TrainBusMonitorParameters,
 }
 
 _INTRODUCTION = """\

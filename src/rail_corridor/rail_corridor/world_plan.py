@@ -17,6 +17,7 @@ from rail_world.radio_description import (
 from rail_world.rail_description import Harmonic, RailDescription, RailFault, TrackCircuit
 from rail_world.world_file import TrainStop, WheelSlip, WorldFile
 
+from .bus_plan import bus_description
 from .cbtc_plan import cbtc_description, threat_periods
 from .fault_sections import DeadStation, DeadTransmitter, Jam, Sanding
 from .fault_sections import TrainStop as TrainStopFault
@@ -109,6 +110,7 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
         cbtc=cbtc_description(scenario),
         threats=threat_periods(scenario),
         references=reference_description(scenario),
+        bus=bus_description(scenario),
         stops=tuple(
             TrainStop(train=fault.train, from_s=fault.from_s, to_s=fault.to_s)
             for fault in scenario.faults

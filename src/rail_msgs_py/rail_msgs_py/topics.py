@@ -15,6 +15,18 @@ from sensor_msgs.msg import Range
 from std_msgs.msg import Float64MultiArray, Header, String
 from visualization_msgs.msg import MarkerArray
 
+from rail_msgs_py.bus_topics import (
+    BUS_LINK,
+    BUS_LINKS,
+    BUS_RX,
+    BUS_STATE,
+    BUS_TRACE,
+    BUS_TREND,
+    BUS_TX,
+    BUS_VERDICTS,
+    REFLECTOMETER_RX,
+    REFLECTOMETER_TX,
+)
 from rail_msgs_py.cbtc_topics import (
     ATP_STATE,
     AUTHORITY,
@@ -56,7 +68,7 @@ CLOCK: Final = Topic(
     None,
     "world",
     "wrs, zone_controller, track_code_transmitter, cbtc_base_station, cbtc_radio, backbone, "
-    "reference_station",
+    "reference_station, bus_medium, bus_terminal, train_bus_monitor",
     "Start of a tick.",
 )
 STATE: Final = Topic(
@@ -120,7 +132,8 @@ DONE: Final = Topic(
     Header,
     STREAM,
     None,
-    "radio_medium, rail_medium, cbtc_medium, backbone, reference_medium, zone_controller",
+    "radio_medium, rail_medium, cbtc_medium, backbone, reference_medium, bus_medium, "
+    "zone_controller",
     "world",
     "The node has finished the tick of this stamp.",
 )
@@ -149,10 +162,11 @@ FAILED: Final = Topic(
     None,
     "every node that waits for others, the report for the launcher: world, radio_medium, "
     "rail_medium, cbtc_medium, backbone, zone_controller, track_code_transmitter, "
-    "cbtc_base_station, code_supervision, cbtc_radio, atp, reference_medium, localizer",
+    "cbtc_base_station, code_supervision, cbtc_radio, atp, reference_medium, localizer, "
+    "bus_medium, bus_terminal, train_bus_monitor",
     "world, radio_medium, rail_medium, cbtc_medium, backbone, zone_controller, "
     "track_code_transmitter, cbtc_base_station, code_supervision, cbtc_radio, atp, "
-    "reference_medium, localizer, the report",
+    "reference_medium, localizer, bus_medium, bus_terminal, train_bus_monitor, the report",
     "A node that is not waited for any longer, and why.",
 )
 DIAGNOSTICS: Final = Topic(
@@ -310,6 +324,8 @@ ALL: Final[tuple[Topic, ...]] = (
     *(BACKBONE_DOWN, BACKBONE_UP, STRIKES),
     *(REFERENCE_TX, REFERENCE_RX, DOPPLER_FIX, DOPPLER_POSITION),
     *(TOLD_POSITION, LOCALIZER_POSITION, LOCALIZER_STATE),
+    *(BUS_TX, BUS_RX, BUS_LINK, REFLECTOMETER_TX, REFLECTOMETER_RX, BUS_TRACE, BUS_VERDICTS),
+    *(BUS_TREND, BUS_STATE, BUS_LINKS),
 )
 
 STATE_COLUMNS: Final = (

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from rail_world.bus_description import BusDescription
 from rail_world.cbtc_description import CbtcDescription
 from rail_world.description import JunctionDescription, TrackDescription
 from rail_world.network import Network, build_network
@@ -57,6 +58,7 @@ class WorldFile(BaseModel):
         (), description="what an intruder does to the frames on the backbone"
     )
     references: ReferenceDescription | None = None
+    bus: BusDescription | None = None
     stops: tuple[TrainStop, ...] = ()
     slips: tuple[WheelSlip, ...] = ()
     odometer_error: float = Field(

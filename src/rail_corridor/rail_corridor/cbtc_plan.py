@@ -109,7 +109,7 @@ def cbtc_nodes(scenario: Scenario, world_file: str, timeout_s: float) -> list[No
     plan = scenario.cbtc
     if plan is None:
         return []
-    radio = _radio(scenario, plan)
+    radio = radio_parameters(scenario, plan)
     medium = {
         "world_file": world_file,
         "burst_samples": burst_format(plan).samples,
@@ -153,7 +153,8 @@ def secret(scenario: Scenario) -> str:
     return hashlib.sha256(f"safe channels of seed {scenario.seed}".encode()).hexdigest()
 
 
-def _radio(scenario: Scenario, plan: CbtcPlan) -> dict[str, Any]:
+def radio_parameters(scenario: Scenario, plan: CbtcPlan) -> dict[str, Any]:
+    """Parameters of the train radio that are the same at the wayside and on board."""
     fastest_mps = max(train.vehicle.max_speed_kmh for train in scenario.trains) / 3.6
     highest_hz = max(plan.uplinks_hz.values())
     return {

@@ -132,6 +132,14 @@ def run(
         Path | None,
         typer.Option("--record", help="Record every topic.", metavar="FILE.mcap"),
     ] = None,
+    switches: Annotated[
+        bool | None,
+        typer.Option(
+            "--switches/--no-switches",
+            help="Whether equipment can be switched off by its lifecycle service, which takes "
+            "time to start where many nodes share a process; the default is to, with --rate.",
+        ),
+    ] = None,
 ) -> None:
     """Run a corridor, and report."""
     import math
@@ -158,7 +166,15 @@ def run(
     from .launcher import run as run_corridor
 
     options = RunOptions(  # type: ignore[arg-type]
-        rate, processes, only, report, timeout, tuple(external or ()), kills, record
+        rate,
+        processes,
+        only,
+        report,
+        timeout,
+        tuple(external or ()),
+        kills,
+        record,
+        rate > 0.0 if switches is None else switches,
     )
     raise typer.Exit(run_corridor(loaded, options, Console()))  # type: ignore[arg-type]
 

@@ -49,7 +49,7 @@ _NAMED = {
     *("doppler_positioner", "localizer"),
     *("bus_terminal", "train_bus_monitor"),
 }
-#: With more nodes than this in a process the parameter services are left out.
+#: With more nodes than this in a process the services are left out.
 MOST_NODES_WITH_SERVICES = 12
 
 
@@ -59,7 +59,7 @@ def node_class(kind: str) -> Any:
     return getattr(importlib.import_module(module), name)
 
 
-def make_node(spec: NodeSpec, context: Any, services: bool) -> Any:
+def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:
     """Create a node; equipment is switched on."""
     namespace, _, name = spec.name.rpartition("/")
     arguments: dict[str, Any] = {
@@ -75,19 +75,20 @@ def make_node(spec: NodeSpec, context: Any, services: bool) -> Any:
     return node
 
 
-def make_nodes(specs: Sequence[NodeSpec], context: Any) -> list[Any]:
-    """Create the nodes of one process; many of them go without parameter services.
+def make_nodes(specs: Sequence[NodeSpec], context: Any, *, switches: bool = False) -> list[Any]:
+    """Create the nodes of one process; many of them go without services.
 
+    With ``switches`` they keep those that switch equipment off and on.
     What is there by then stays: no need to look through it for garbage again.
     """
-    services = len(specs) <= MOST_NODES_WITH_SERVICES
+    services: Any = len(specs) <= MOST_NODES_WITH_SERVICES or (switches and "switches")
     nodes = [make_node(spec, context, services) for spec in specs]
     gc.collect()
     gc.freeze()
     return nodes
 
 
-def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None) -> None:
+def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None, *, switches: bool = False) -> None:
     """Make nodes in this process and spin them until SIGTERM.
 
     Parameters
@@ -95,6 +96,8 @@ def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None) -> None:
     specs : sequence of NodeSpec
     tap : Tap, optional
         Is told of everything that they publish.
+    switches : bool
+        As of `make_nodes`.
     """
     import rclpy
     from rclpy.signals import SignalHandlerOptions
@@ -103,7 +106,7 @@ def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None) -> None:
 
     context = make_context(tap)
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
-    nodes = make_nodes(specs, context)
+    nodes = make_nodes(specs, context, switches=switches)
     try:
         spin(context, nodes)
     finally:

@@ -53,6 +53,7 @@ class RunOptions:
     external: tuple[str, ...] = ()
     kills: tuple[Kill, ...] = ()
     record: Path | None = None
+    switches: bool = False
 
     @property
     def with_strangers(self) -> bool:
@@ -167,7 +168,8 @@ class _Run:
 
     def _child(self, name: str, specs: list[NodeSpec]) -> None:
         """In a process of its own: run nodes, and tell the recorder what they publish."""
-        run_nodes(specs, self._recording.tap_of(name) if self._recording else None)
+        tap = self._recording.tap_of(name) if self._recording else None
+        run_nodes(specs, tap, switches=self._options.switches)
 
     def _record(self, path: Path, nodes: int) -> RunRecording:
         """Start the recorder, before any other process and before ROS."""
@@ -211,7 +213,8 @@ class _Run:
             context=context,
             record=self._options.only != "onboard",
         )
-        nodes = [self._observer, *make_nodes(self._here, context)]
+        here = make_nodes(self._here, context, switches=self._options.switches)
+        nodes = [self._observer, *here]
         if tap is not None and self._options.with_strangers:
             ours = {spec.name for specs in self._groups.values() for spec in specs}
             others = [spec.name for spec in self._plan.nodes if spec.name not in ours]

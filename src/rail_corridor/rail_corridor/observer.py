@@ -12,8 +12,10 @@ from rail_msgs_py import topics
 from rail_msgs_py.failures import failure
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.qos import OBSERVER_WINDOW_TICKS
+from rail_msgs_py.stamps import NANOSECONDS
 
 from .intake import Intake
+from .map_markers import train_markers
 from .plan import Plan
 from .recording import Recording
 
@@ -48,6 +50,9 @@ class Observer(CorridorNode):
         self.intake = Intake(plan, tracks)
         self._failed = self.publisher(topics.FAILED)
         if record:
+            self._network = plan.world.network()
+            self._first_tracks = tuple(train.route[0] for train in plan.world.trains)
+            self._markers = self.publisher(topics.TRAIN_MARKERS)
             self._observed = self.publisher(topics.OBSERVED)
         for reader in self.intake.readers:
             if not reader.raw:
@@ -102,9 +107,27 @@ class Observer(CorridorNode):
             intake.last_tick_s = now_s
             take(raw)
             tick = self.tick - 1
+            of_a_second = tick * self._tick_ns % NANOSECONDS < self._tick_ns
+            if of_a_second and self._markers.get_subscription_count():
+                self._publish_markers(tick - 1)
             if tick % window == 0:
                 header = Header()
                 header.stamp.sec, header.stamp.nanosec = divmod(tick * self._tick_ns, 1_000_000_000)
                 self._observed.publish(header)
 
         return take_state
+
+    def _publish_markers(self, tick: int) -> None:
+        """Trains of a tick in the map; everything about the one before the present is in."""
+        if tick < 0:
+            return
+        recording = self.intake.recording
+        records = [recording.state, recording.position]
+        if recording.localizer:
+            records.append(recording.located)
+        rows = [record.upto(tick + 1)[tick] for record in records]
+        stamp_ns = tick * self._tick_ns
+        markers = train_markers(
+            stamp_ns, recording.trains, self._network, *rows, first_tracks=self._first_tracks
+        )
+        self._markers.publish(markers)

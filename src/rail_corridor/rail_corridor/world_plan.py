@@ -13,10 +13,12 @@ from rail_world.radio_description import (
     Fault,
     RadioDescription,
     StationAntenna,
+    ZoneExtent,
 )
 from rail_world.rail_description import Harmonic, RailDescription, RailFault, TrackCircuit
 from rail_world.world_file import TrainStop, WheelSlip, WorldFile
 
+from .announcement import announcement
 from .bus_plan import bus_description
 from .cbtc_plan import cbtc_description, threat_periods
 from .fault_sections import DeadStation, DeadTransmitter, Jam, Sanding
@@ -122,6 +124,17 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
             if isinstance(fault, WheelSlipFault)
         ),
         odometer_error=scenario.odometer_error,
+        zones=tuple(
+            ZoneExtent(
+                zone=zone.name,
+                track=zone.track,
+                start_m=zone.start_m,
+                end_m=zone.end_m,
+                downlink_channel=zone.downlink_channel,
+            )
+            for zone in layout.zones
+        ),
+        scenario=announcement(scenario),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, Literal
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
@@ -21,10 +21,12 @@ from rail_msgs_py.tap import raw_publish, tapped
 from rail_msgs_py.topic import Topic
 
 READY_POLL_S = 0.05
+#: Which services a node offers beside its topics: all, none, or the lifecycle's alone.
+Services = bool | Literal["switches"]
 
 
 def node_arguments(
-    context: Any, parameters: Mapping[str, Any] | None, services: bool
+    context: Any, parameters: Mapping[str, Any] | None, services: Services
 ) -> dict[str, Any]:
     """Constructor arguments common to all nodes.
 
@@ -33,14 +35,15 @@ def node_arguments(
     context : rclpy Context, or None for the default one
     parameters : mapping, or None
         Values that override the defaults, as from a parameter file.
-    services : bool
+    services : bool or 'switches'
         Whether to offer the parameter services; they quadruple the time to create a node.
+        ``switches``: none but those that switch equipment off and on.
     """
     return {
         "context": context,
         "parameter_overrides": overrides(dict(parameters or {})),
-        "start_parameter_services": services,
-        "enable_rosout": services,
+        "start_parameter_services": services is True,
+        "enable_rosout": services is True,
     }
 
 
@@ -163,7 +166,7 @@ class CorridorNode(CorridorMixin, Node):  # type: ignore[misc]
         *,
         context: Any = None,
         parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
+        services: Services = True,
     ) -> None:
         super().__init__(name, namespace=namespace, **node_arguments(context, parameters, services))
         self.init_corridor()
@@ -183,12 +186,12 @@ class Equipment(CorridorMixin, LifecycleNode):  # type: ignore[misc]
         *,
         context: Any = None,
         parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
+        services: Services = True,
     ) -> None:
         super().__init__(
             name,
             namespace=namespace,
-            enable_communication_interface=services,
+            enable_communication_interface=bool(services),
             **node_arguments(context, parameters, services),
         )
         self.switched_on = False
@@ -198,6 +201,19 @@ class Equipment(CorridorMixin, LifecycleNode):  # type: ignore[misc]
         """Configure and activate."""
         self.trigger_configure()
         self.trigger_activate()
+
+    def _LifecycleNodeMixin__on_change_state(self, request: Any, response: Any) -> Any:
+        """Answer the service; takes the place of rclpy's own function.
+
+        In rclpy 7.1 a transition that the state does not know, as switching on what is on, raises
+        out of the executor and ends the process.
+        """
+        try:
+            return super()._LifecycleNodeMixin__on_change_state(request, response)
+        except Exception as error:
+            self.get_logger().warning(f"transition {request.transition.id} refused: {error}")
+            response.success = False
+            return response
 
     def on_activate(self, state: Any) -> Any:
         """Lifecycle transition."""

@@ -125,7 +125,28 @@ CORRIDOR_MARKERS: Final = Topic(
     None,
     "world",
     "RViz, Foxglove",
-    "Masts of the wayside stations in `map`.",
+    "Masts of the wayside stations and their zones, coloured by channel pair, in `map`.",
+)
+SCENARIO: Final = Topic(
+    "/world/scenario",
+    String,
+    LATCHED,
+    None,
+    "world",
+    "rail view, people",
+    "The scenario as JSON, and what follows from it: tracks, stations, zones, circuits and base "
+    "stations with their places.",
+)
+TRAIN_MARKERS: Final = Topic(
+    "/report/trains",
+    MarkerArray,
+    ESTIMATE,
+    None,
+    "the report",
+    "RViz, Foxglove",
+    "Trains in `map` once a second of simulated time, while somebody listens: the truth in grey, "
+    "the position by phase ranging as an ellipsoid of two sigma, the interval of the localizer as "
+    "a line.",
 )
 DONE: Final = Topic(
     "{node}/done",
@@ -316,7 +337,8 @@ COMMAND: Final = Topic(
 )
 
 ALL: Final[tuple[Topic, ...]] = (
-    *(CLOCK, STATE, TRUTH, LINKS, FINISHED, CORRIDOR_PATH, CORRIDOR_MARKERS, DONE, OBSERVED),
+    *(CLOCK, STATE, TRUTH, LINKS, FINISHED, CORRIDOR_PATH, CORRIDOR_MARKERS, SCENARIO),
+    *(TRAIN_MARKERS, DONE, OBSERVED),
     *(READY, FAILED, DIAGNOSTICS, WRS_TX, WRS_RX, RANGE, VRS_RX, VRS_TX, VRS_CHANNEL, POSITION),
     *(CIRCUIT_TX, CIRCUIT_RX, OCCUPANCY, CODE_SENT, CODE_RX, CODE_RECEIVED, ODOMETER, COMMAND),
     *(CBTC_BASE_TX, CBTC_BASE_RX, CBTC_TRAIN_TX, CBTC_TRAIN_RX, DOWN_TELEGRAMS, UP_TELEGRAMS),

@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point, PoseStamped
 from nav_msgs.msg import Path
 from visualization_msgs.msg import Marker, MarkerArray
 
-from rail_world.radio_description import StationAntenna
+from rail_world.network import Network
+from rail_world.radio_description import StationAntenna, ZoneExtent
 from rail_world.track import Track
 
 STEP_M = 10.0
+#: Okabe and Ito's colours, told apart by colour-blind people as well: one to a channel pair.
+PAIR_COLOURS = (
+    *((0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.00, 0.62, 0.45), (0.80, 0.47, 0.65)),
+    *((0.34, 0.71, 0.91), (0.84, 0.37, 0.00), (0.94, 0.89, 0.26)),
+)
 
 
 def path_of(track: Track) -> Path:
@@ -35,9 +41,11 @@ def path_of(track: Track) -> Path:
     return path
 
 
-def markers(stations: Sequence[StationAntenna]) -> MarkerArray:
-    """A mast with its name for every wayside station."""
-    array = MarkerArray()
+def markers(
+    stations: Sequence[StationAntenna], zones: Sequence[ZoneExtent], network: Network
+) -> MarkerArray:
+    """A mast with its name for every wayside station, and its zones as lines along the track."""
+    array = MarkerArray(markers=_zone_lines(zones, network))
     masts = {antenna.site: antenna.position_m for antenna in stations}
     for number, (site, position_m) in enumerate(masts.items()):
         for kind, text in ((Marker.CYLINDER, ""), (Marker.TEXT_VIEW_FACING, site)):
@@ -50,3 +58,25 @@ def markers(stations: Sequence[StationAntenna]) -> MarkerArray:
             marker.color.r, marker.color.g, marker.color.b, marker.color.a = 0.1, 0.4, 0.8, 1.0
             array.markers.append(marker)
     return array
+
+
+def _zone_lines(zones: Sequence[ZoneExtent], network: Network) -> list[Marker]:
+    """A line for every zone in the colour of its channel pair."""
+    channels = sorted({zone.downlink_channel for zone in zones})
+    lines = []
+    for number, zone in enumerate(zones):
+        count = max(2, round((zone.end_m - zone.start_m) / STEP_M) + 1)
+        pose = network.tracks[zone.track].pose(np.linspace(zone.start_m, zone.end_m, count))
+        line = Marker(ns="zones", id=number, type=Marker.LINE_STRIP)
+        line.header.frame_id = "map"
+        line.pose.orientation.w = 1.0
+        line.scale.x = 3.0
+        colour = PAIR_COLOURS[channels.index(zone.downlink_channel) % len(PAIR_COLOURS)]
+        line.color.r, line.color.g, line.color.b = colour
+        line.color.a = 1.0
+        line.points = [
+            Point(x=float(x), y=float(y), z=float(z))
+            for x, y, z in zip(pose.x_m, pose.y_m, pose.z_m, strict=True)
+        ]
+        lines.append(line)
+    return lines

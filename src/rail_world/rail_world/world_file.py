@@ -10,7 +10,7 @@ from rail_world.bus_description import BusDescription
 from rail_world.cbtc_description import CbtcDescription
 from rail_world.description import JunctionDescription, TrackDescription
 from rail_world.network import Network, build_network
-from rail_world.radio_description import RadioDescription
+from rail_world.radio_description import RadioDescription, ZoneExtent
 from rail_world.rail_description import RailDescription
 from rail_world.reference_description import ReferenceDescription
 from rail_world.threat_description import ThreatPeriod
@@ -61,6 +61,8 @@ class WorldFile(BaseModel):
     bus: BusDescription | None = None
     stops: tuple[TrainStop, ...] = ()
     slips: tuple[WheelSlip, ...] = ()
+    zones: tuple[ZoneExtent, ...] = ()
+    scenario: str = Field("", description="JSON, announced as it is on /world/scenario")
     odometer_error: float = Field(
         0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' relative error"
     )

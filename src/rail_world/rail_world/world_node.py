@@ -1,8 +1,8 @@
 """The world: moves the trains, publishes the truth, and drives the ticks.
 
 Topics out: ``/clock``, ``/world/state``, ``/world/<train>/odometry``, ``/world/<track>/path``,
-``/world/markers``, ``/world/finished``, ``/<train>/odometer``. Topics in: ``<sink>/done``,
-``/<train>/<supervision>/command``, ``/report/observed``, ``/ready``, ``/failed``.
+``/world/markers``, ``/world/scenario``, ``/world/finished``, ``/<train>/odometer``. Topics in:
+``<sink>/done``, ``/<train>/<supervision>/command``, ``/report/observed``, ``/ready``, ``/failed``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
-from std_msgs.msg import Header
+from std_msgs.msg import Header, String
 
 from rail_msgs_py import topics
 from rail_msgs_py.failures import FailureWatch
@@ -138,7 +138,10 @@ class WorldNode(CorridorNode):
             publisher.publish(path_of(track))
             self._latched.append(publisher)
         publisher = self.publisher(topics.CORRIDOR_MARKERS)
-        publisher.publish(markers(described.radio.stations))
+        publisher.publish(markers(described.radio.stations, described.zones, network))
+        self._latched.append(publisher)
+        publisher = self.publisher(topics.SCENARIO)
+        publisher.publish(String(data=described.scenario))
         self._latched.append(publisher)
         self._pace: Any = None
         self._watch_timer = self.every(WATCH_PERIOD_S, self._check)

@@ -6,6 +6,7 @@ import fcntl
 import os
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -29,9 +30,8 @@ os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
 _DOMAINS = range(40, 100)
 
 
-@pytest.fixture
-def ros_domain() -> Iterator[int]:
-    """Return a ROS domain that no other test on this machine is in."""
+@contextmanager
+def _free_domain() -> Iterator[int]:
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     for step in range(len(_DOMAINS)):
         domain = _DOMAINS[(worker * 7 + step) % len(_DOMAINS)]
@@ -44,6 +44,20 @@ def ros_domain() -> Iterator[int]:
             yield domain
             return
     raise RuntimeError("every domain is taken")
+
+
+@pytest.fixture
+def ros_domain() -> Iterator[int]:
+    """Return a ROS domain that no other test on this machine is in."""
+    with _free_domain() as domain:
+        yield domain
+
+
+@pytest.fixture(scope="module")
+def module_domain() -> Iterator[int]:
+    """Return a ROS domain that no other module of tests on this machine is in."""
+    with _free_domain() as domain:
+        yield domain
 
 
 _ONLY_RUN = {

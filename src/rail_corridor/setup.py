@@ -10,7 +10,10 @@ setup(
     maintainer="Rail Corridor maintainers",
     maintainer_email="maintainers@rail-corridor.example",
     packages=find_packages(include=[package_name, f"{package_name}.*"]),
-    package_data={package_name: ["py.typed", "fastdds.xml", "scenarios/*.yaml"]},
+    package_data={
+        package_name: ["py.typed", "fastdds.xml", "scenarios/*.yaml"],
+        f"{package_name}.view": ["static/*"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
         (f"share/{package_name}", ["package.xml"]),

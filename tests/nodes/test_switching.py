@@ -32,9 +32,10 @@ def test_a_transition_that_cannot_be_is_refused_and_harms_nobody(graph: Any) -> 
 
 
 def test_nodes_with_switches_have_no_other_services(graph: Any) -> None:
-    graph.add(WrsNode(context=graph.context, services="switches"))
-    graph.add(WrsNode("wrs2", context=graph.context, services=False))
-    graph.wait(lambda: graph.bystander.count_services(SERVICE))
+    # Names that no corridor has, should one be near.
+    graph.add(WrsNode("with", context=graph.context, services="switches"))
+    graph.add(WrsNode("without", context=graph.context, services=False))
+    graph.wait(lambda: graph.bystander.count_services("/wayside/with/change_state"))
     names = {name for name, _ in graph.bystander.get_service_names_and_types()}
-    assert not any(name.endswith("/set_parameters") for name in names)
-    assert "/wayside/wrs2/change_state" not in names
+    assert "/wayside/with/set_parameters" not in names
+    assert "/wayside/without/change_state" not in names

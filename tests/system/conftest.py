@@ -11,6 +11,7 @@ import sys
 import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -149,10 +150,9 @@ class Rail:
         return there - _segments_of(everybody)
 
 
-@pytest.fixture
-def rail(tmp_path: Path, ros_domain: int) -> Iterator[Rail]:
-    """Return a runner of ``rail``; whatever it has started is gone afterwards."""
-    runner = Rail(tmp_path, ros_domain)
+@contextmanager
+def _runner(directory: Path, domain: int) -> Iterator[Rail]:
+    runner = Rail(directory, domain)
     yield runner
     for pid in runner.processes():
         try:
@@ -161,6 +161,20 @@ def rail(tmp_path: Path, ros_domain: int) -> Iterator[Rail]:
             continue
     for process in runner.started:
         process.wait()
+
+
+@pytest.fixture
+def rail(tmp_path: Path, ros_domain: int) -> Iterator[Rail]:
+    """Return a runner of ``rail``; whatever it has started is gone afterwards."""
+    with _runner(tmp_path, ros_domain) as runner:
+        yield runner
+
+
+@pytest.fixture(scope="module")
+def module_rail(tmp_path_factory: pytest.TempPathFactory, module_domain: int) -> Iterator[Rail]:
+    """Return a runner of ``rail`` that the tests of a module share."""
+    with _runner(tmp_path_factory.mktemp("rail"), module_domain) as runner:
+        yield runner
 
 
 class Listener:

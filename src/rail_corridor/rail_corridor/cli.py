@@ -23,6 +23,7 @@ from .usage import (
     check_library,
     check_writable,
 )
+from .view.command import view
 from .workshop_commands import add_to as add_workshop
 
 app = typer.Typer(
@@ -237,6 +238,9 @@ def hz(
     from .live_tools import topic_rate
 
     raise typer.Exit(topic_rate(topic))
+
+
+app.command()(view)
 
 
 @app.command()

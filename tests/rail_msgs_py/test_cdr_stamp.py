@@ -58,6 +58,8 @@ def table(*names: str) -> bytes:
         (UInt8MultiArray, telegrams(STAMP_NS)),
         (UInt8MultiArray, telegrams(STAMP_NS, [(3, bytes(FRAME_BYTES))])),
     ],
+    # Not the bytes themselves: what CDR fills gaps with is any.
+    ids=lambda value: value.__name__ if isinstance(value, type) else f"{len(value)} bytes",
 )
 def test_it_is_the_time_that_was_put_in(kind: Any, raw: bytes) -> None:
     assert stamp_reader(kind)(raw) == STAMP_NS

@@ -515,3 +515,22 @@ def test_a_driver_who_keeps_to_the_permitted_speed_is_left_alone(
     assert -0.01 < short_m <= limit_m + 1e-9  # a driver 1 s late overshoots by millimetres
     here = train.where.location(train.time_s)
     assert end_s - train.s <= train.margin_m + limit_m + 2.0 * here.uncertainty_m + 1e-9
+
+
+def test_a_train_that_is_believed_to_stand_starts_again_though_it_may_be_faster() -> None:
+    """A localizer whose interval must hold without the wheels leaves m/s open at a stand."""
+    supervision = AuthoritySupervision(LENGTH_M, margin_m=MARGIN_M)
+
+    def tick(time_s: float, speed_mps: float, fastest_mps: float) -> SupervisionOutput:
+        authority = replace(FAR, sealed_s=time_s)
+        return supervision.update(
+            time_s, at(0.0, 5.0), speed_mps, authority=authority, fastest_mps=fastest_mps
+        )
+
+    assert flags(tick(0.5, 10.0, 11.0)) == (False, False, False)
+    # A doubt that comes all at once takes the service brake, a speed that is believed the other.
+    over_mps = 20.0 + LIMITS.emergency_over_mps + 0.5
+    assert flags(tick(1.0, 19.0, over_mps)) == (True, True, False)
+    assert flags(tick(1.5, over_mps, over_mps)) == (True, True, True)
+    assert flags(tick(2.0, 3.0, 6.0)) == (True, True, True)
+    assert flags(tick(2.5, 0.0, 3.9)) == (False, False, False)

@@ -174,17 +174,19 @@ class AtpNode(Equipment):
         heard = items.get(_RADIO)
         frames = heard.in_slot(self._p.number) if heard else []
         protection = self._protection
-        place, doubt_mps = None, 0.0
+        place, fastest_mps, doubt_mps = None, None, 0.0
         if self._p.localizer:
             known = located(items.get(_LOCALIZER))
             place = NOWHERE
             if known is not None:
                 place = Location(known.low_m + known.half_m, known.half_m, True)
-                speed_mps, doubt_mps = known.fastest_mps, known.doubt_mps
+                speed_mps = known.believed_mps
+                fastest_mps, doubt_mps = known.fastest_mps, known.doubt_mps
         out, sent = _OFF, []
         if self.switched_on:
-            out = protection.tick(stamp_ns, distance_m, speed_mps, frames, place)
-            sent = [(self._p.number, protection.frame(stamp_ns, speed_mps))]
+            out = protection.tick(stamp_ns, distance_m, speed_mps, frames, place, fastest_mps)
+            told_mps = speed_mps if fastest_mps is None else fastest_mps
+            sent = [(self._p.number, protection.frame(stamp_ns, told_mps))]
         self._tell(telegrams(stamp_ns, sent))
         if self._p.localizer:
             newest = max(protection.told, default=_NOT_TOLD) if self.switched_on else _NOT_TOLD

@@ -169,6 +169,7 @@ class AuthoritySupervision:
         speed_mps: float,
         *,
         authority: Authority | None = None,
+        fastest_mps: float | None = None,
     ) -> SupervisionOutput:
         """One tick.
 
@@ -183,6 +184,9 @@ class AuthoritySupervision:
         authority : Authority, optional
             The latest one received. One that is not newer than that in force, from the future, or
             whose steps are not in the order of travel, is ignored.
+        fastest_mps : float, optional
+            The fastest that the train may run, by a localizer; `speed_mps` is then the speed that
+            is believed, and only tells whether it stands.
         """
         if not (isfinite(time_s) and isfinite(speed_mps)):
             self._service = self._emergency = "no odometer"
@@ -193,6 +197,7 @@ class AuthoritySupervision:
         if authority is not None:
             self._take(authority)
         speed_mps = abs(speed_mps)
+        fastest = speed_mps if fastest_mps is None else fastest_mps
         located = location.valid and isfinite(location.position_m)
         located = located and 0.0 <= location.uncertainty_m < inf
         permitted_mps, ahead_m = self._permitted(location) if located else (inf, inf)
@@ -201,9 +206,9 @@ class AuthoritySupervision:
             self._blind = None
         else:
             if self._blind is None:
-                self._blind = time_s, speed_mps
+                self._blind = time_s, fastest
             permitted_mps = min(permitted_mps, self._stopping_mps(time_s))
-        return self._judge(speed_mps, permitted_mps, ahead_m, stop)
+        return self._judge(fastest, speed_mps, permitted_mps, ahead_m, stop)
 
     def _take(self, authority: Authority) -> None:
         places_m = [self._direction * at_m for at_m, _ in authority.steps]
@@ -256,12 +261,23 @@ class AuthoritySupervision:
         return max(0.0, speed_mps - self._braking.service_deceleration_mps2 * braked_s)
 
     def _judge(
-        self, speed_mps: float, permitted_mps: float, ahead_m: float, stop: str
+        self,
+        speed_mps: float,
+        believed_mps: float,
+        permitted_mps: float,
+        ahead_m: float,
+        stop: str,
     ) -> SupervisionOutput:
-        """Warn, brake or release."""
+        """Warn, brake or release.
+
+        Where the speed gets doubtful all at once, the service brake answers; the emergency brake
+        does where the train is too fast as it is believed, or could not stop before the end.
+        """
         limits = self._thresholds
-        standing = speed_mps <= STANDSTILL_MPS
-        cause = self._emergency_cause(speed_mps, permitted_mps, ahead_m, stop)
+        standing = believed_mps <= STANDSTILL_MPS
+        ceiling_mps = limits.emergency_mps(permitted_mps)
+        cause = self._emergency_cause(speed_mps, ahead_m, stop)
+        cause = cause or ("too fast" if believed_mps > ceiling_mps else "")
         self._emergency = self._emergency or cause
         # A train that is held starts again for a speed that is worth it only.
         start_mps = max(limits.release_under_mps if self._service else 0.0, STANDSTILL_MPS)
@@ -285,10 +301,8 @@ class AuthoritySupervision:
             self._emergency or self._service,
         )
 
-    def _emergency_cause(
-        self, speed_mps: float, permitted_mps: float, ahead_m: float, stop: str
-    ) -> str:
-        """Why the emergency brake is to act; empty if there is no cause."""
+    def _emergency_cause(self, speed_mps: float, ahead_m: float, stop: str) -> str:
+        """Why the emergency brake is to act at this place; empty if there is no cause."""
         if stop == "emergency stop":
             return stop
         if speed_mps > STANDSTILL_MPS:
@@ -296,4 +310,4 @@ class AuthoritySupervision:
                 return "end passed"
             if self._braking.stopping_m(speed_mps, emergency=True) > ahead_m:
                 return "end too near"
-        return "too fast" if speed_mps > self._thresholds.emergency_mps(permitted_mps) else ""
+        return ""

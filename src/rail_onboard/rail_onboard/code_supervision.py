@@ -227,8 +227,8 @@ class CodeSupervision:
         located_m : (float, float), optional
             Least and most of the way by a localizer, of any origin; it grows with the travel [m].
         fastest_mps : float, optional
-            The fastest that the train may run, by a localizer; the odometer then only tells whether
-            it stands.
+            The fastest that the train may run, by a localizer; `speed_mps` is then the speed that
+            is believed, and only tells whether it stands.
         """
         if time_s < self._time_s:
             self.reset()

@@ -112,6 +112,7 @@ class CodeSupervisionNode(Equipment):
         known = located(items.get(_LOCALIZER))
         if known is not None:
             way_m = known.travelled(self._p.direction)
+            speed_mps = known.believed_mps
             fastest_mps, doubt_mps = known.fastest_mps, known.doubt_mps
         output = self._supervision.update(
             stamp_ns * 1e-9,

@@ -24,6 +24,11 @@ class Located:
     doubt_mps: float
 
     @property
+    def believed_mps(self) -> float:
+        """The speed that is believed, without direction [m/s]."""
+        return self.fastest_mps - self.doubt_mps
+
+    @property
     def half_m(self) -> float:
         """Half of the interval [m]."""
         return 0.5 * (self.high_m - self.low_m)

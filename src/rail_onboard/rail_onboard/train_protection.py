@@ -74,8 +74,19 @@ class TrainProtection:
         speed_mps: float,
         frames: Iterable[bytes],
         located: Location | None = None,
+        fastest_mps: float | None = None,
     ) -> SupervisionOutput:
-        """One tick: odometer and frames received in it, and where a localizer says the front is."""
+        """One tick: odometer and frames received in it, and what a localizer says.
+
+        Parameters
+        ----------
+        time_ns : int
+        distance_m, speed_mps : float
+            Of the odometer; with a localizer the speed that it believes.
+        frames : iterable of bytes
+        located, fastest_mps : optional
+            Where a localizer says the front is, and the fastest that the train may run.
+        """
         time_s = time_ns / NANOSECONDS
         self.told = []
         self._location.update(time_s, distance_m, speed_mps)
@@ -88,7 +99,9 @@ class TrainProtection:
             if authority is not None and (newest is None or authority.sealed_s > newest.sealed_s):
                 newest = authority
         self._here = self._location.location(time_s) if located is None else located
-        return self._supervision.update(time_s, self._here, speed_mps, authority=newest)
+        return self._supervision.update(
+            time_s, self._here, speed_mps, authority=newest, fastest_mps=fastest_mps
+        )
 
     def _read(self, frame: bytes, time_ns: int) -> Authority | None:
         _, opened = self._channel.open(frame, time_ns)

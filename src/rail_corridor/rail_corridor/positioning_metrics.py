@@ -31,19 +31,28 @@ def positioning_metrics(scenario: Scenario, recording: Recording, index: int) ->
     found: dict[str, Any] = {}
     if recording.references:
         fixes = recording.doppler.upto(ticks)[:, index]
-        given = on_line & (fixes[:, _DOPPLER["reason"]] == 0.0)
-        bound_m = np.empty(0)
-        if given.any():
-            here = ReferencedTrack.of(scenario, scenario.trains[index].route[0])
-            speed_mps = mine[on_line, _STATE["speed_mps"]]
-            positions = given[on_line]
-            bounds_m = here.run_bound_m(front_m[on_line], speed_mps, positions, scenario.tick_s)
-            bound_m = bounds_m[positions]
-        found["doppler"] = _doppler(on_line, front_m, fixes, bound_m)
+        bound_m = doppler_bound_m(scenario, recording, index)
+        found["doppler"] = _doppler(on_line, front_m, fixes, bound_m[~np.isnan(bound_m)])
     if recording.localizer:
         located = recording.located.upto(ticks)[:, index]
         found["localizer"] = _localizer(on_line, front_m, located)
     return found
+
+
+def doppler_bound_m(scenario: Scenario, recording: Recording, index: int) -> FloatArray:
+    """Bound of the Doppler positions of one train [tick] [m], NaN where it has given none."""
+    mine = recording.state.upto(recording.ticks)[:, index]
+    on_line = mine[:, _STATE["on_line"]] > 0.0
+    fixes = recording.doppler.upto(recording.ticks)[:, index]
+    given = on_line & (fixes[:, _DOPPLER["reason"]] == 0.0)
+    bound_m = np.full(len(mine), np.nan)
+    if given.any():
+        here = ReferencedTrack.of(scenario, scenario.trains[index].route[0])
+        front_m, speed_mps = (mine[on_line, _STATE[name]] for name in ("chainage_m", "speed_mps"))
+        positions = given[on_line]
+        bounds_m = here.run_bound_m(front_m, speed_mps, positions, scenario.tick_s)
+        bound_m[given] = bounds_m[positions]
+    return bound_m
 
 
 def _doppler(

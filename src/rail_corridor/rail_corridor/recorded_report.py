@@ -12,7 +12,7 @@ import math
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.serialization import deserialize_message
 from rich.console import Console
@@ -21,10 +21,11 @@ from rail_msgs_py.message_definition import type_name
 
 from .errors import InputError
 from .intake import Intake, Reader
-from .plan import make_plan
+from .plan import Plan, make_plan
 from .recording_file import RecordedChannel, RecordedMessage, RecordingFile
 from .report import make_report, print_report, write_report
 from .run_facts import BEGIN, END, Beginning, Ending
+from .scenario import Scenario
 from .scenario_files import scenario_from
 
 REPORT = "report.json"
@@ -51,6 +52,16 @@ def show_report(path: Path, json_path: Path | None, console: Console) -> int:
     return 0
 
 
+class RecordedRun(NamedTuple):
+    """A run as its recording tells it; ``ending`` is None if that was cut short."""
+
+    scenario: Scenario
+    plan: Plan
+    intake: Intake
+    beginning: Beginning
+    ending: Ending | None
+
+
 def report_of(file: RecordingFile) -> dict[str, Any]:
     """Report of a recording; reads it to its end.
 
@@ -59,6 +70,22 @@ def report_of(file: RecordingFile) -> dict[str, Any]:
     InputError
         If it is damaged, or not a recording of a corridor.
     """
+    run = run_of(file)
+    ending, intake = run.ending, run.intake
+    wall_s = math.nan if ending is None or ending.wall_time_s is None else ending.wall_time_s
+    intake.first_tick_s, intake.last_tick_s = 0.0, wall_s
+    return make_report(
+        run.scenario,
+        run.plan,
+        intake,
+        nodes=run.beginning.nodes,
+        processes=run.beginning.processes,
+        interrupted=ending is None or not ending.complete,
+    )
+
+
+def run_of(file: RecordingFile) -> RecordedRun:
+    """What a recording tells of its run; reads it to its end, raises as `report_of`."""
     name = str(file.path)
     with tempfile.TemporaryDirectory(prefix="rail_corridor_") as directory:
         try:
@@ -70,21 +97,12 @@ def report_of(file: RecordingFile) -> dict[str, Any]:
             ending = Ending.of(file.metadata[END]) if END in file.metadata else None
         except InputError as error:
             raise error.located(name) from None
-        recording = intake.recording
-        if ending is None:
-            recording.end_at(max(recording.ticks - 1, 0))
-        elif not ending.complete:
-            recording.end_at(ending.ticks)
-        wall_s = math.nan if ending is None or ending.wall_time_s is None else ending.wall_time_s
-        intake.first_tick_s, intake.last_tick_s = 0.0, wall_s
-        return make_report(
-            scenario,
-            plan,
-            intake,
-            nodes=beginning.nodes,
-            processes=beginning.processes,
-            interrupted=ending is None or not ending.complete,
-        )
+    recording = intake.recording
+    if ending is None:
+        recording.end_at(max(recording.ticks - 1, 0))
+    elif not ending.complete:
+        recording.end_at(ending.ticks)
+    return RecordedRun(scenario, plan, intake, beginning, ending)
 
 
 def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any] | None) -> list[str]:

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from .errors import InputError
-from .figures import COLOURS, STYLE
+from .figure_style import COLOURS, STYLE
 from .referenced_track import ReferencedTrack
 from .scenario import Scenario
 
@@ -99,24 +99,27 @@ def draw_accuracy(lines: Sequence[Accuracy], path: Path) -> None:
     with mpl.rc_context(style):
         figure = Figure(figsize=(12.0, 3.6 * len(lines) + 0.6), layout="constrained")
         for axes, line in zip(np.atleast_1d(figure.subplots(len(lines), 1)), lines, strict=True):
-            km = line.chainage_m / 1000.0
-            for speed, bound, colour in zip(line.speeds_kmh, line.bound_m, COLOURS, strict=False):
-                shown = np.clip(bound, _LEAST_M, _WORST_M)
-                axes.plot(km, shown, color=colour, lw=1.0, label=f"{speed:g} km/h")
-            for side, marker in ((1.0, "^"), (-1.0, "v")):
-                here = line.feet_m[line.sides == side] / 1000.0
-                label = f"station to the {'left' if side > 0 else 'right'}"
-                axes.plot(
-                    here, np.full(here.size, _WORST_M), marker, color="black", ms=5, label=label
-                )
-            axes.set(
-                title=f"{line.track}: least standard deviation of a position from one block",
-                xlabel="chainage [km]",
-                ylabel="bound [m]",
-                yscale="log",
-                xlim=(km[0], km[-1]),
-                ylim=(max(_LEAST_M, 0.5 * float(line.bound_m.min())), 1.5 * _WORST_M),
-            )
-            axes.grid(visible=True, which="major", alpha=0.4)
-            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=9)
+            draw_line(axes, line)
         figure.savefig(path)
+
+
+def draw_line(axes: Any, line: Accuracy) -> None:
+    """Draw the bounds of one track."""
+    km = line.chainage_m / 1000.0
+    for speed, bound, colour in zip(line.speeds_kmh, line.bound_m, COLOURS, strict=False):
+        shown = np.clip(bound, _LEAST_M, _WORST_M)
+        axes.plot(km, shown, color=colour, lw=1.0, label=f"{speed:g} km/h")
+    for side, marker in ((1.0, "^"), (-1.0, "v")):
+        here = line.feet_m[line.sides == side] / 1000.0
+        label = f"station to the {'left' if side > 0 else 'right'}"
+        axes.plot(here, np.full(here.size, _WORST_M), marker, color="black", ms=5, label=label)
+    axes.set(
+        title=f"{line.track}: least standard deviation of a position from one block",
+        xlabel="chainage [km]",
+        ylabel="bound [m]",
+        yscale="log",
+        xlim=(km[0], km[-1]),
+        ylim=(max(_LEAST_M, 0.5 * float(line.bound_m.min())), 1.5 * _WORST_M),
+    )
+    axes.grid(visible=True, which="major", alpha=0.4)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=9)

@@ -13,6 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import typer
 
+from .figure_commands import add_to as add_figures
 from .recording_commands import add_to as add_recordings
 from .study_commands import add_to as add_studies
 from .usage import (
@@ -244,28 +245,6 @@ app.command()(view)
 
 
 @app.command()
-def figures(
-    directory: Annotated[
-        Path, typer.Argument(help="Where the pictures go.", metavar="[OUTDIR]")
-    ] = Path("figures"),
-    only: Annotated[
-        list[str] | None,
-        typer.Option("--only", help="Draw this figure; repeatable.", metavar="NAME"),
-    ] = None,
-) -> None:
-    """Draw the figures of the source documents and of the project, from its own code."""
-    from .figures import FIGURES, draw
-
-    for name in only or ():
-        check_choice("--only", name, tuple(FIGURES))
-    if directory.exists() and not directory.is_dir():
-        raise UsageError(f"OUTDIR: {directory}: is not a directory")
-    check_writable("OUTDIR", directory / "any")
-    for path in draw(directory, tuple(only or ())):
-        typer.echo(path)
-
-
-@app.command()
 def bench(
     names: Annotated[
         list[str] | None, typer.Argument(help="Rows to run; all if none.", metavar="NAME...")
@@ -285,6 +264,7 @@ def bench(
 add_studies(app)
 add_recordings(app)
 add_workshop(app)
+add_figures(app)
 
 
 def main() -> None:

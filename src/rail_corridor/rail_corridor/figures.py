@@ -2,54 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import html
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
-
-mpl.use("Agg")
-
 from matplotlib.figure import Figure
 
-from . import track_code_figures
+from . import (
+    doppler_figures,
+    ranging_figures,
+    track_code_figures,
+    train_bus_figures,
+    train_radio_figures,
+)
+from .figure_style import STYLE, Picture
 
-#: Colours that people with any colour vision tell apart (Okabe and Ito, 2008).
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-
-STYLE: dict[str, Any] = {
-    "axes.prop_cycle": mpl.cycler(color=COLOURS),
-    "axes.grid": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "figure.dpi": 110,
-    "figure.figsize": (8.0, 4.5),
-    "figure.constrained_layout.use": True,
-    "font.size": 11,
-    "grid.alpha": 0.3,
-    "lines.linewidth": 1.6,
-    "svg.hashsalt": "rail corridor",
+#: Name of a figure -> what draws it, and what to see.
+FIGURES: dict[str, Picture] = {
+    **ranging_figures.FIGURES,
+    **doppler_figures.FIGURES,
+    **train_bus_figures.FIGURES,
+    **track_code_figures.FIGURES,
+    **train_radio_figures.FIGURES,
 }
 
-#: Name of a figure -> what draws it.
-FIGURES: dict[str, Callable[[Figure], None]] = {**track_code_figures.FIGURES}
+#: What takes longer than a figure may, and how to get it.
+ELSEWHERE = {
+    "headway over the margin of the train radio": "rail sweep link_margin",
+    "limits of detection on the bus": "python benchmarks/train_bus_faults.py --curve",
+    "bound of Doppler positions along a line of your own": "rail accuracy SCENARIO",
+}
 
 
-def draw(directory: Path, names: tuple[str, ...] = ()) -> Iterator[Path]:
+def draw(directory: Path, pictures: Mapping[str, Picture]) -> Iterator[Path]:
     """Draw figures into a directory; yield the file of each.
 
     Parameters
     ----------
     directory : Path
         Made if it is not there.
-    names : tuple of str
-        Figures wanted; all if empty.
+    pictures : mapping of str to Picture
+        By name, as `FIGURES`.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    for name in names or tuple(FIGURES):
+    for name, picture in pictures.items():
         with mpl.rc_context(STYLE):
             figure = Figure()
-            FIGURES[name](figure)
+            picture.draw(figure)
             path = directory / f"{name}.png"
             figure.savefig(path, metadata={"Software": None})
         yield path
+
+
+def write_index(directory: Path, pictures: Mapping[str, Picture]) -> Path:
+    """Write a page of all figures with their captions; returns its file."""
+    parts = [
+        f'<figure id="{name}">\n<img src="{name}.png" alt="{name}">\n'
+        f"<figcaption><b>{name}</b>: {html.escape(picture.caption)}</figcaption>\n</figure>"
+        for name, picture in pictures.items()
+    ]
+    path = directory / "index.html"
+    path.write_text(_PAGE.format(figures="\n".join(parts)), encoding="utf-8")
+    return path
+
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>Rail corridor: figures</title>
+<style>
+body {{ font: 16px/1.5 sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }}
+figure {{ margin: 0 0 3rem; }}
+img {{ max-width: 100%; }}
+</style>
+<h1>Rail corridor: figures</h1>
+{figures}
+</html>
+"""

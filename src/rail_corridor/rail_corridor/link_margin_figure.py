@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from .figures import COLOURS, STYLE
+from .figure_style import COLOURS, STYLE
 from .link_margin_theory import brakings_per_hour, line_es_n0_db
 
 if TYPE_CHECKING:

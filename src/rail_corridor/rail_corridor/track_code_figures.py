@@ -1,8 +1,8 @@
-"""Figures 5, 8 to 11 and 13 of Kim et al. (DSP of railway signals), and the receiver's own."""
+"""Figures 5 to 13 of Kim et al. (DSP of railway signals), and the receiver's own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,6 +14,9 @@ from rail_signals.track_code_filters import dc_rejecter, post_demodulation_filte
 from rail_signals.track_code_profile import load_profile
 from rail_signals.track_code_signal import FmTransmitter
 from rail_signals.track_code_word import encode
+
+from . import track_code_error_figure
+from .figure_style import Picture
 
 FloatArray = NDArray[np.float64]
 
@@ -88,6 +91,40 @@ def _spectra(figure: Figure, title: str, waves: dict[str, FloatArray], marked_hz
     axes.legend()
 
 
+def _filter(figure: Figure, frequency_hz: float, *, squared: bool) -> None:
+    wave = noisy_wave(frequency_hz, 2048, squared=squared)
+    time_ms = 1e3 * np.arange(wave.size) / BOARD_RATE_HZ
+    above, below = figure.subplots(2, 1, sharex=True, sharey=True)
+    above.plot(time_ms, wave, color="#0072B2")
+    below.plot(time_ms, filtered(wave), color="#D55E00")
+    kind = "square wave" if squared else "sine"
+    above.set(title=f"A {kind} of {frequency_hz:.0f} Hz with noise of 8 kHz", ylabel="before")
+    below.set(ylabel="after the low-pass", xlabel="time [ms]", xlim=(20.0, 35.0), ylim=(-1.9, 1.9))
+
+
+def fm_wave(seconds: float = 0.1) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Time [s], deviation sent [Hz] and the carrier of it, three times as deep (Fig. 12)."""
+    profile = load_profile("three_tones")
+    deep = replace(profile, deviations_hz=tuple(3.0 * d for d in profile.deviations_hz))
+    rate_hz, carrier_hz = 48_000.0, 500.0
+    bits = encode(deep, {name: 1 for name, _ in deep.fields})
+    wave = FmTransmitter(deep, carrier_hz, rate_hz).block(bits, round(seconds * rate_hz))
+    time_s = np.arange(wave.size) / rate_hz
+    sent = np.zeros_like(time_s)
+    for tone_hz, deviation_hz in zip(deep.tones_hz, deep.deviations_hz, strict=True):
+        sent += deviation_hz * np.sin(2 * np.pi * tone_hz * time_s)
+    return time_s, sent, np.asarray(wave)
+
+
+def _fig12(figure: Figure) -> None:
+    time_s, sent, wave = fm_wave()
+    above, below = figure.subplots(2, 1, sharex=True)
+    above.plot(1e3 * time_s, sent, color="#0072B2")
+    below.plot(1e3 * time_s, wave, color="#D55E00", lw=1.0)
+    above.set(title="Three tones on a carrier of 500 Hz", ylabel="deviation sent [Hz]")
+    below.set(ylabel="carrier", xlabel="time [ms]", xlim=(0.0, 1e3 * time_s[-1]))
+
+
 def _fig8(figure: Figure) -> None:
     waves = {f"{count} samples": noisy_wave(400.0, count) for count in (516, 512)}
     _spectra(figure, "400 Hz and noise of 8 kHz, sampled every 20 µs", waves, 400.0)
@@ -153,12 +190,54 @@ def delay_samples(sent: FloatArray, received: FloatArray, most: int = 800) -> in
     return int(np.argmin(errors))
 
 
-FIGURES: dict[str, Callable[[Figure], None]] = {
-    "track_code_fig05_three_tones": _fig5,
-    "track_code_fig08_sine_spectrum": _fig8,
-    "track_code_fig09_board_fft": _fig9,
-    "track_code_fig10_square_spectrum": _fig10,
-    "track_code_fig11_filtered_sine": _fig11,
-    "track_code_fig13_demodulated": _fig13,
-    "track_code_dc_rejecter": _rejecter,
+FIGURES: dict[str, Picture] = {
+    "track_code_fig05_three_tones": Picture(
+        _fig5,
+        "Fig 5: the spectrum of three tones in a rectangular window of 100 samples. Each lies in "
+        "its own bin with |X| = 50; there is nothing elsewhere.",
+    ),
+    "track_code_fig06_filtered_square": Picture(
+        lambda figure: _filter(figure, 200.0, squared=True),
+        "Fig 6: a square wave of 200 Hz with noise of 8 kHz, before and after the low-pass.",
+    ),
+    "track_code_fig07_filtered_sine": Picture(
+        lambda figure: _filter(figure, 400.0, squared=False),
+        "Fig 7: a sine of 400 Hz with noise of 8 kHz, before and after the low-pass.",
+    ),
+    "track_code_fig08_sine_spectrum": Picture(
+        _fig8,
+        "Fig 8: the nearest bin depends on the number of samples: 387.6 Hz with 516, 390.6 Hz "
+        "with 512, for 400 Hz.",
+    ),
+    "track_code_fig09_board_fft": Picture(
+        _fig9, "Fig 9: 300 Hz in 8192 samples of 20 µs: the peak is bin 49, at 299.07 Hz."
+    ),
+    "track_code_fig10_square_spectrum": Picture(
+        _fig10,
+        "Fig 10: the spectrum of Fig 6. The fundamental stands out; the low-pass takes the noise "
+        "of 8 kHz away.",
+    ),
+    "track_code_fig11_filtered_sine": Picture(
+        _fig11, "Fig 11: the spectrum of Fig 7, before and after the low-pass."
+    ),
+    "track_code_fig12_fm_wave": Picture(
+        _fig12,
+        "Fig 12: the carrier in the rails and the wave that modulates it: its periods shorten "
+        "where the wave is high. The deviation is three times that of the profile, to be seen.",
+    ),
+    "track_code_fig13_demodulated": Picture(
+        _fig13,
+        "Fig 13: the wave synthesised in the transmitter and what the receiver demodulates, set "
+        "off by its delay.",
+    ),
+    "track_code_dc_rejecter": Picture(
+        _rejecter,
+        "Equation 10, with its gain mended: the DC rejecter leaves all but the lowest tone alone.",
+    ),
+    "track_code_message_errors": Picture(
+        track_code_error_figure.draw,
+        "Words of 27 tones that are lost: the bound for one slot of 1.6 s, the maximum-likelihood "
+        "fit started near the truth (250 words a point), and the document's chain with its "
+        "discriminator and all its rules (100 slots a point). docs/track_codes.md has long counts.",
+    ),
 }

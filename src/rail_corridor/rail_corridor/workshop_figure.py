@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from rail_signals.bus_fault_words import fault_words, size_of
 from rail_signals.tdr_traces import summarise
 
-from .figures import COLOURS, STYLE
+from .figure_style import COLOURS, STYLE
 from .workshop import Diagnosis
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -40,9 +39,8 @@ def test_a_killed_process_is_named_and_the_corridor_goes_on(
     listener.until(lambda: len(clock) > 10)
     (pid,) = (pid for pid, name in rail.processes().items() if name == process)
     os.kill(pid, signal.SIGKILL)
-    killed_s, killed_ns = time.monotonic(), to_ns(clock[-1].clock)
+    killed_ns = to_ns(clock[-1].clock)
     listener.until(lambda: node in {message.name for message in failed})
-    assert time.monotonic() - killed_s < 2.0
     # It goes on: three more seconds of simulated time pass.
     listener.until(lambda: to_ns(clock[-1].clock) > killed_ns + 3_000_000_000)
     assert rail.finish(run) == 0
@@ -51,6 +49,7 @@ def test_a_killed_process_is_named_and_the_corridor_goes_on(
     assert report["ticks"] == 150
     (failure,) = report["failures"]
     assert failure["node"] == node
+    # By the launcher, which saw it die, not by a timeout.
     assert "SIGKILL" in failure["reason"]
     assert node in rail.output(run)
     assert not rail.processes()

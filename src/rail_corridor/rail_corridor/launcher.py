@@ -21,7 +21,7 @@ from .errors import InputError
 from .host import make_context, make_nodes, node_class, run_nodes
 from .kills import Executioner, Kill, check_kills
 from .middleware import discover_on
-from .plan import WORLD, Placement, Plan, check_external, make_plan
+from .plan import REPORT, WORLD, Placement, Plan, check_external, make_plan
 from .processes import ProcessGroup, remove_orphaned_segments
 from .recorder_frames import Attachment
 from .report import make_report, print_report, report_text, write_report
@@ -75,13 +75,14 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
     discover_on("all" if options.only else "this")
     directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
     try:
+        strangers = (BYSTANDER,) if options.record and options.with_strangers else ()
         plan = make_plan(
             scenario,
             directory,
             rate=options.rate,
             timeout_s=options.timeout_s,
             external=options.external,
-            bystanders=(BYSTANDER,) if options.record and options.with_strangers else (),
+            bystanders=(REPORT, *strangers),
         )
         check_external(plan, options.external)
         with sole_corridor(options.only):

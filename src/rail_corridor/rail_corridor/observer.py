@@ -16,10 +16,10 @@ from rail_msgs_py.stamps import NANOSECONDS
 
 from .intake import Intake
 from .map_markers import train_markers
-from .plan import Plan
+from .plan import REPORT, Plan
 from .recording import Recording
 
-NAME = "report"
+NAME = REPORT.strip("/")
 
 
 class Observer(CorridorNode):
@@ -61,7 +61,9 @@ class Observer(CorridorNode):
                 take = self._noting(reader.take) if reader.topic is topics.STATE else reader.take
                 self.stream_in(reader.topic, take, **reader.parts)
         self.every(0.1, on_progress)
-        self.announce_when_connected()
+        # The world begins when the report of the run is connected, not that of another host.
+        if record:
+            self.announce_when_connected()
 
     @property
     def recording(self) -> Recording:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -29,6 +29,8 @@ from .world_plan import survey, world_file
 Placement = Literal["one", "site", "node"]
 
 WORLD, MEDIUM, CONTROLLER = "/world", "/world/radio_medium", "/wayside/zone_controller"
+#: Full name of the node that reads the run for its report.
+REPORT: Final = "/report"
 #: Participants of one host that discovery on the local host can bring together, with margin.
 MOST_PROCESSES = 26
 

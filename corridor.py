@@ -190,7 +190,7 @@ def compile_what_runs() -> None:
     """
     names = sorted(
         ".".join(path.relative_to(ROOT / "src").with_suffix("").parts[1:])
-        for path in (ROOT / "src").glob("*/*/*.py")
+        for path in (ROOT / "src").glob("*/*/**/*.py")
     )
     code = (
         "import contextlib, importlib, sys\n"

@@ -6,18 +6,18 @@ import time
 
 import numpy as np
 
-from rail_corridor.plan import Plan
-from rail_corridor.scenario import Scenario
-from rail_onboard.channel_selector import ChannelSelector
-from rail_signals.line_receiver import LineReceiver
-from rail_signals.ranging_signal import modulate
-from rail_signals.transponder import reply_lag_rad
-from rail_wayside.ranging_station import RangingStation
+from rail_corridor.run.plan import Plan
+from rail_corridor.scenario.model import Scenario
+from rail_onboard.ranging.channel_selector import ChannelSelector
+from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.signal import modulate
+from rail_signals.ranging.transponder import reply_lag_rad
+from rail_wayside.ranging.ranging_station import RangingStation
+from rail_wayside.ranging.train_tracker import Reading, ZoneTracker
 from rail_wayside.zone_controller_node import ZoneControllerParameters, zone_map_of
-from rail_wayside.zone_tracking import Reading, ZoneTracker
-from rail_world.radio import RadioMedium
-from rail_world.radio_medium_node import antennas_of
-from rail_world.traffic import Traffic
+from rail_world.ranging.medium import RadioMedium
+from rail_world.ranging.medium_node import antennas_of
+from rail_world.trains.traffic import Traffic
 
 
 def arithmetic_ms(scenario: Scenario, plan: Plan, ticks: int) -> float:

@@ -30,11 +30,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from rail_signals.diversity_error_rate import SCHEMES, error_rate
-from rail_signals.diversity_link import DiversityLink
-from rail_signals.diversity_monte_carlo import Link
-from rail_signals.diversity_plain import PlainLink
-from rail_signals.space_time_block import Scheme
+from rail_signals.train_radio.ber.closed_form import SCHEMES, error_rate
+from rail_signals.train_radio.ber.link import DiversityLink
+from rail_signals.train_radio.ber.monte_carlo import Link
+from rail_signals.train_radio.ber.plain_link import PlainLink
+from rail_signals.train_radio.space_time_block import Scheme
 
 FOLDER = Path(__file__).parent / "peers"
 PEERS = {"komm": "komm_ber.py", "pyphysim": "pyphysim_ber.py"}

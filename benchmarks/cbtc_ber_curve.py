@@ -23,11 +23,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rail_signals.diversity_error_rate import SCHEMES, error_rate
-from rail_signals.diversity_link import DiversityLink
-from rail_signals.diversity_monte_carlo import until
-from rail_signals.diversity_stale_channel import jakes_correlation, stale_error_rate
-from rail_signals.space_time_block import Scheme
+from rail_signals.train_radio.ber.closed_form import SCHEMES, error_rate
+from rail_signals.train_radio.ber.link import DiversityLink
+from rail_signals.train_radio.ber.monte_carlo import until
+from rail_signals.train_radio.ber.stale_channel import jakes_correlation, stale_error_rate
+from rail_signals.train_radio.space_time_block import Scheme
 
 CONFIDENCE = 0.999
 ERRORS = 400

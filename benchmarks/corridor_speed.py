@@ -18,7 +18,7 @@ from arithmetic_floor import arithmetic_ms
 from in_process import plan_of
 from transport_floor import transport_ms
 
-from rail_corridor.scenario import Scenario, load_scenario, scenario_from_data
+from rail_corridor.scenario.model import Scenario, load_scenario, scenario_from_data
 
 #: Stations and trains of the rows `corridor.scale_*`.
 SCALES = ((10, 5), (30, 5), (114, 1), (114, 5), (114, 10), (114, 20))
@@ -90,7 +90,7 @@ def _run(scenario: Scenario) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         path, report = Path(folder) / "scenario.yaml", Path(folder) / "report.json"
         path.write_text(scenario.to_json())  # JSON is YAML
-        command = [sys.executable, "-m", "rail_corridor.cli", "run", str(path)]
+        command = [sys.executable, "-m", "rail_corridor.cli.main", "run", str(path)]
         subprocess.run(
             [*command, "--processes", "one", "--report", str(report)],
             check=True,

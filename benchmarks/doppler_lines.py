@@ -31,22 +31,21 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from rail_corridor.overrides import Overrides
-from rail_corridor.positioning_plan import positioning_nodes, reference_description
-from rail_corridor.referenced_track import FloatArray, ReferencedTrack
-from rail_corridor.scenario import Scenario, load_scenario
-from rail_msgs_py.topics import STATE_COLUMNS
-from rail_onboard.doppler_positioner import DopplerPositioner
-from rail_onboard.doppler_positioner_node import DopplerPositionerParameters, positioner_of
-from rail_signals.doppler_position import Reason
-from rail_signals.doppler_signal import reference_tone
-from rail_world.reference_medium import ReferenceMedium
-from rail_world.traffic import Traffic
+from rail_corridor.equipment.doppler.nodes import positioning_nodes, reference_description
+from rail_corridor.equipment.doppler.referenced_track import FloatArray, ReferencedTrack
+from rail_corridor.scenario.model import Scenario, load_scenario
+from rail_corridor.scenario.overrides import Overrides
+from rail_msgs_py.topics.world import STATE
+from rail_onboard.doppler.positioner import DopplerPositioner
+from rail_onboard.doppler.positioner_node import DopplerPositionerParameters, positioner_of
+from rail_signals.doppler.signal import reference_tone
+from rail_signals.doppler.solver import Reason
+from rail_world.doppler.medium import ReferenceMedium
+from rail_world.trains.traffic import Traffic
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "data"
 LINES = ("CN_Songjiazhuang_Yizhuang", "CH_StGallen_Wil")
 MOVING_MPS = 20.0 / 3.6
-COLUMN = {name: index for index, name in enumerate(STATE_COLUMNS)}
 
 
 def positioner_in(scenario: Scenario) -> DopplerPositioner:
@@ -99,7 +98,9 @@ def follow(scenario: Scenario, every: int) -> Run:
         last_s = time_s
         fix = answer.fix if answer.reason is Reason.NONE else None
         found = (np.nan, np.nan) if fix is None else (fix.chainage_m, fix.sigma_m)
-        rows.append((state[0, COLUMN["chainage_m"]], state[0, COLUMN["speed_mps"]], *found))
+        rows.append(
+            (state[0, STATE.index["chainage_m"]], state[0, STATE.index["speed_mps"]], *found)
+        )
         if fix is None and abs(rows[-1][1]) >= MOVING_MPS:
             reasons[answer.reason.name.lower()] += 1
         if traffic.all_arrived:

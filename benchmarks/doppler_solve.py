@@ -32,11 +32,11 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.doppler_bound import shift_variance_hz2
-from rail_signals.doppler_line import SurveyedLine
-from rail_signals.doppler_plan import TonePlan
-from rail_signals.doppler_position import DopplerSolver, Prior, Reason
-from rail_world.alignment import Alignment, Element
+from rail_signals.doppler.bound import shift_variance_hz2
+from rail_signals.doppler.solver import DopplerSolver, Prior, Reason
+from rail_signals.doppler.surveyed_line import SurveyedLine
+from rail_signals.doppler.tone_plan import TonePlan
+from rail_world.line.alignment import Alignment, Element
 
 FloatArray = NDArray[np.float64]
 

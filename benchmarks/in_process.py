@@ -17,10 +17,10 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from rail_corridor.host import make_node
-from rail_corridor.middleware import discover_on
-from rail_corridor.plan import Plan, make_plan
-from rail_corridor.scenario import Overrides, Scenario, load_scenario
+from rail_corridor.run.host import make_node
+from rail_corridor.run.middleware import discover_on
+from rail_corridor.run.plan import Plan, make_plan
+from rail_corridor.scenario.model import Overrides, Scenario, load_scenario
 
 
 def run_in_process(plan: Plan, around: Callable[[Any], None] | None = None) -> tuple[float, float]:
@@ -30,7 +30,7 @@ def run_in_process(plan: Plan, around: Callable[[Any], None] | None = None) -> t
     from rclpy.signals import SignalHandlerOptions
     from rclpy.task import Future
 
-    from rail_msgs_py import topics
+    from rail_msgs_py.topics.tick import CLOCK, FINISHED
 
     discover_on("this")
     context = rclpy.Context()
@@ -46,10 +46,8 @@ def run_in_process(plan: Plan, around: Callable[[Any], None] | None = None) -> t
         marks.append((time.perf_counter(), time.process_time()))
 
     world = nodes[0]
-    world.listen(topics.FINISHED, lambda _: (mark(), done.set_result(None)))
-    world.create_subscription(
-        topics.CLOCK.type, topics.CLOCK.name(), lambda _: marks or mark(), topics.CLOCK.qos
-    )
+    world.listen(FINISHED, lambda _: (mark(), done.set_result(None)))
+    world.create_subscription(CLOCK.type, CLOCK.name(), lambda _: marks or mark(), CLOCK.qos)
     executor = EventsExecutor(context=context)
     for node in nodes:
         executor.add_node(node)

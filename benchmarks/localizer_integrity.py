@@ -31,17 +31,17 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from rail_signals.localizer_campaign import Tally, stated_s, tally
-from rail_signals.localizer_core import LocalizerCore
-from rail_signals.localizer_faults import CASES, Kind
-from rail_signals.localizer_readings import (
+from rail_signals.localizer.core import LocalizerCore
+from rail_signals.localizer.readings import (
     DopplerReading,
     OdometerReading,
     RangeReading,
     TickReadings,
 )
-from rail_signals.localizer_settings import LocalizerSettings, Sensor
-from rail_signals.localizer_simulation import SimulatedLine
+from rail_signals.localizer.settings import LocalizerSettings, Sensor
+from rail_signals.localizer.study.campaign import Tally, stated_s, tally
+from rail_signals.localizer.study.faults import CASES, Kind
+from rail_signals.localizer.study.simulation import SimulatedLine
 
 MISMATCHES = {
     "as believed": {},

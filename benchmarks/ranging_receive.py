@@ -28,9 +28,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from rail_signals.bounds import tone_phase_variance_bound
-from rail_signals.line_receiver import LineReceiver
-from rail_signals.ranging_signal import RangingSignal, modulate
+from rail_signals.ranging.bounds import tone_phase_variance_bound
+from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.signal import RangingSignal, modulate
 
 PEER = Path(__file__).parent / "peers" / "gnuradio_ranging.py"
 SNR = 100.0

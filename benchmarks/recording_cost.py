@@ -21,8 +21,8 @@ from typing import Any
 
 from mcap.writer import CompressionType, Writer
 
-from rail_corridor.mcap_recorder import CHUNK_BYTES
-from rail_corridor.recording_file import RecordingFile
+from rail_corridor.recording.mcap_file import RecordingFile
+from rail_corridor.recording.mcap_recorder import CHUNK_BYTES
 
 PAIRS = 7
 
@@ -55,7 +55,7 @@ def rows(names: tuple[str, ...] = (), pairs: int = PAIRS) -> Iterator[dict[str, 
 def speed(folder: Path, *arguments: str) -> float:
     """Simulated seconds per second of the demo, all nodes in one process."""
     report = folder / "report.json"
-    command = [sys.executable, "-m", "rail_corridor.cli", "run", "demo", "--processes", "one"]
+    command = [sys.executable, "-m", "rail_corridor.cli.main", "run", "demo", "--processes", "one"]
     subprocess.run(
         [*command, "--report", str(report), *arguments],
         check=True,

@@ -35,13 +35,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy import signal
 
-from rail_signals.tone_levels import tone_estimator
-from rail_signals.track_code_decision import Decision
-from rail_signals.track_code_fast import FastTrackCodeReceiver
-from rail_signals.track_code_profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
-from rail_signals.track_code_receiver import TrackCodeReceiver
-from rail_signals.track_code_signal import FmTransmitter
-from rail_signals.track_code_word import encode
+from rail_signals.track_code.decision import Decision
+from rail_signals.track_code.profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
+from rail_signals.track_code.receiver import FastTrackCodeReceiver
+from rail_signals.track_code.reference_receiver import TrackCodeReceiver
+from rail_signals.track_code.signal import FmTransmitter
+from rail_signals.track_code.tone_levels import tone_estimator
+from rail_signals.track_code.word import encode
 
 PEER = Path(__file__).parent / "peers" / "gnuradio_track_code.py"
 RATES = {"track_code.decode_16k": 16_000.0, "track_code.decode_48k": 48_000.0}

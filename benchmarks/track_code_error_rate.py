@@ -39,7 +39,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy import fft, signal, stats
 
-from rail_signals.track_code_bound import (
+from rail_signals.track_code.bound import (
     best_threshold,
     message_error_bound,
     snr_of_message_error,
@@ -47,15 +47,15 @@ from rail_signals.track_code_bound import (
     undetected_error_probability,
     window_probabilities,
 )
-from rail_signals.track_code_decision import MOST_NOISE
-from rail_signals.track_code_demodulator import DemodulatorChain
-from rail_signals.track_code_filters import DEMODULATED_RATE_HZ, dc_rejecter, response
-from rail_signals.track_code_ml import MaximumLikelihoodTones
-from rail_signals.track_code_ml_tracker import TrackedTones
-from rail_signals.track_code_profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
-from rail_signals.track_code_receiver import TrackCodeReceiver, receiver_estimator
-from rail_signals.track_code_signal import FmTransmitter
-from rail_signals.track_code_word import crc
+from rail_signals.track_code.decision import MOST_NOISE
+from rail_signals.track_code.demodulator import DemodulatorChain
+from rail_signals.track_code.filters import DEMODULATED_RATE_HZ, dc_rejecter, response
+from rail_signals.track_code.ml import MaximumLikelihoodTones
+from rail_signals.track_code.ml_tracker import TrackedTones
+from rail_signals.track_code.profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
+from rail_signals.track_code.reference_receiver import TrackCodeReceiver, receiver_estimator
+from rail_signals.track_code.signal import FmTransmitter
+from rail_signals.track_code.word import crc
 
 CARRIER_HZ = 1700.0
 RATE_HZ = 16_000.0

@@ -3,7 +3,8 @@
     python benchmarks/train_bus_faults.py [--cases N] [--healthy N] [--snr DB] [--seed N]
                                           [--curve [--figure FILE]] [--json FILE]
 
-Random trains of `rail_signals.bus_campaign`, N of each of the seven kinds of fault and N healthy
+Random trains of `rail_signals.train_bus.study.campaign`, N of each of the seven kinds of fault and
+N healthy
 ones, four traces each, at a signal-to-noise ratio of DB for one trace. Printed are, each with a
 95 % Clopper-Pearson interval: faults found, located within 0.5 m or 1 % of the length of the bus
 (whichever is larger), and named rightly, as shares of all faults; which kind is taken for which;
@@ -31,10 +32,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy import stats
 
-from rail_signals.bus_campaign import HEALTHY, TRACES, Case, Outcome, draw_case, examine
-from rail_signals.bus_consist import COMMON
-from rail_signals.bus_detection import detectable_size, fault_of_size
-from rail_signals.bus_faults import KINDS
+from rail_signals.train_bus.consist import COMMON
+from rail_signals.train_bus.faults import KINDS
+from rail_signals.train_bus.study.campaign import HEALTHY, TRACES, Case, Outcome, draw_case, examine
+from rail_signals.train_bus.study.detection_limits import detectable_size, fault_of_size
 
 CURVE_SNR_DB = (40.0, 50.0, 60.0, 70.0)
 CURVE_KINDS = {

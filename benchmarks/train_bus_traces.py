@@ -32,9 +32,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_signals.bus_cable import Cable
-from rail_signals.bus_cascade import input_reflection
-from rail_signals.bus_line import Line, Section, Termination
+from rail_signals.train_bus.cable import Cable
+from rail_signals.train_bus.cascade import input_reflection
+from rail_signals.train_bus.line import Line, Section, Termination
 
 Trace = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 

@@ -7,14 +7,17 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from rail_msgs_py.topics.ranging import RANGE, VRS_RX, VRS_TX, WRS_RX, WRS_TX
+from rail_msgs_py.topics.tick import CLOCK, DONE
+from rail_msgs_py.topics.topic import Topic
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from rail_corridor.middleware import discover_on
-from rail_msgs_py import topics
+from rail_corridor.run.middleware import discover_on
 from rail_msgs_py.headers import header_to_cdr
-from rail_msgs_py.range_reading import RangeWriter
+from rail_msgs_py.ranging.range_reading import RangeWriter
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.waveform import Waveform, silence
 
@@ -75,20 +78,18 @@ def transport_ms(
     finished = Future()
     count = 0
 
-    def out(owner: Any, topic: topics.Topic, name: str) -> Callable[[bytes], None]:
+    def out(owner: Any, topic: Topic, name: str) -> Callable[[bytes], None]:
         publish: Callable[[bytes], None] = owner.create_publisher(
             topic.type, f"/bench{name}", topic.qos
         ).handle.publish_raw
         return publish
 
-    def listen(owner: Any, topic: topics.Topic, name: str, callback: Any) -> None:
+    def listen(owner: Any, topic: Topic, name: str, callback: Any) -> None:
         owner.create_subscription(topic.type, f"/bench{name}", callback, topic.qos, raw=True)
 
-    tick = out(world, topics.CLOCK, "/clock")
-    to_trains = [
-        out(medium, topics.VRS_RX, f"/t{i}/c{c}") for i in range(trains) for c in range(channels)
-    ]
-    to_zones = [out(medium, topics.WRS_RX, f"/z{i}/rx") for i in range(zones)]
+    tick = out(world, CLOCK, "/clock")
+    to_trains = [out(medium, VRS_RX, f"/t{i}/c{c}") for i in range(trains) for c in range(channels)]
+    to_zones = [out(medium, WRS_RX, f"/z{i}/rx") for i in range(zones)]
 
     def downlink() -> None:
         for index, publish in enumerate(to_trains):
@@ -102,22 +103,22 @@ def transport_ms(
     for i in range(zones):
         station = node(f"bench_z{i}")
         nodes.append(station)
-        send, tell = out(station, topics.WRS_TX, f"/z{i}/tx"), out(station, topics.RANGE, f"/r{i}")
-        listen(station, topics.CLOCK, "/clock", lambda _, send=send: send(block))
-        listen(station, topics.WRS_RX, f"/z{i}/rx", lambda _, tell=tell: tell(reading))
-        listen(medium, topics.WRS_TX, f"/z{i}/tx", from_zones)
+        send, tell = out(station, WRS_TX, f"/z{i}/tx"), out(station, RANGE, f"/r{i}")
+        listen(station, CLOCK, "/clock", lambda _, send=send: send(block))
+        listen(station, WRS_RX, f"/z{i}/rx", lambda _, tell=tell: tell(reading))
+        listen(medium, WRS_TX, f"/z{i}/tx", from_zones)
     for i in range(trains):
         vehicle = node(f"bench_t{i}")
         nodes.append(vehicle)
-        send = out(vehicle, topics.VRS_TX, f"/t{i}/tx")
+        send = out(vehicle, VRS_TX, f"/t{i}/tx")
         answer = _Barrier(channels, lambda send=send: send(block))
         for c in range(channels):
-            listen(vehicle, topics.VRS_RX, f"/t{i}/c{c}", answer)
-        listen(medium, topics.VRS_TX, f"/t{i}/tx", from_trains)
-    over = out(controller, topics.DONE, "/done")
+            listen(vehicle, VRS_RX, f"/t{i}/c{c}", answer)
+        listen(medium, VRS_TX, f"/t{i}/tx", from_trains)
+    over = out(controller, DONE, "/done")
     readings = _Barrier(zones, lambda: over(done))
     for i in range(zones):
-        listen(controller, topics.RANGE, f"/r{i}", readings)
+        listen(controller, RANGE, f"/r{i}", readings)
 
     def next_tick(_: bytes) -> None:
         nonlocal count
@@ -127,7 +128,7 @@ def transport_ms(
         else:
             finished.set_result(None)
 
-    listen(world, topics.DONE, "/done", next_tick)
+    listen(world, DONE, "/done", next_tick)
     executor = EventsExecutor(context=context)
     for each in nodes:
         executor.add_node(each)

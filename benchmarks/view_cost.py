@@ -23,7 +23,7 @@ from urllib.request import urlopen
 
 from corridor_speed import line
 
-RAIL = [sys.executable, "-m", "rail_corridor.cli"]
+RAIL = [sys.executable, "-m", "rail_corridor.cli.main"]
 #: As often as the page asks.
 ASK_S = 0.21
 

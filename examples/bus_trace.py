@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rail_signals.bus_consist import Deviations
-from rail_signals.bus_faults import BadSplice
-from rail_signals.bus_profile import load_bus_profile
-from rail_signals.bus_train import cable_consist
-from rail_signals.tdr_reflectometer import Reflectometer, measure_consist
+from rail_signals.train_bus.consist import Deviations
+from rail_signals.train_bus.faults import BadSplice
+from rail_signals.train_bus.profile import load_bus_profile
+from rail_signals.train_bus.tdr.reflectometer import Reflectometer, measure_consist
+from rail_signals.train_bus.train import cable_consist
 
 TRACES = 4
 

@@ -12,17 +12,18 @@ from pathlib import Path
 
 import numpy as np
 
-from rail_corridor.middleware import discover_on
-from rail_corridor.plan import CONTROLLER, make_plan
-from rail_corridor.scenario import load_scenario
-from rail_msgs_py import topics
+from rail_corridor.run.middleware import discover_on
+from rail_corridor.run.plan import CONTROLLER, make_plan
+from rail_corridor.scenario.model import load_scenario
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.parameters import declare
 from rail_msgs_py.position import Position
-from rail_msgs_py.range_reading import RangeReading
+from rail_msgs_py.ranging.range_reading import RangeReading
 from rail_msgs_py.standalone import run_node
+from rail_msgs_py.topics.ranging import POSITION, RANGE
+from rail_msgs_py.topics.tick import DONE
 from rail_wayside.zone_controller_node import ZoneControllerParameters, zone_map_of
 
 
@@ -35,9 +36,9 @@ class LineFit(CorridorNode):
         self.train, self.zones = described.trains[0], zone_map_of(described).zones
         self.inbox, self.last = TickInbox(self.zones), deque(maxlen=5)
         for zone in self.zones.values():
-            self.stream_in(topics.RANGE, self.on_range, site=zone.site, zone=zone.name)
-        self.position = self.publisher(topics.POSITION, train=self.train)
-        self.done = self.stream_out(topics.DONE, node=self.get_fully_qualified_name())
+            self.stream_in(RANGE, self.on_range, site=zone.site, zone=zone.name)
+        self.position = self.publisher(POSITION, train=self.train)
+        self.done = self.stream_out(DONE, node=self.get_fully_qualified_name())
         self.announce_when_connected()
 
     def on_range(self, raw: bytes) -> None:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rail_signals.bounds import two_way_range_variance_bound
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.delay import fractional_delay
-from rail_signals.line_receiver import LineReceiver
-from rail_signals.phase_range import phase_to_range_m, range_per_radian_m
-from rail_signals.ranging_signal import RangingSignal, modulate
-from rail_signals.transponder import transpond
+from rail_signals.ranging.bounds import two_way_range_variance_bound
+from rail_signals.ranging.phase_range import phase_to_range_m, range_per_radian_m
+from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.signal import RangingSignal, modulate
+from rail_signals.ranging.transponder import transpond
 
 TRANSPONDER_DELAY_S = 1e-6
 SNR = 100.0  # 20 dB per sample, on both legs

@@ -36,7 +36,7 @@ def make_hosts() -> None:
 
 def main(scenario: str = "branch", seconds: str = "10") -> int:
     """Run the scenario on two hosts, then on one, and compare."""
-    run = [sys.executable, "-m", "rail_corridor.cli", "run", scenario, "--duration", seconds]
+    run = [sys.executable, "-m", "rail_corridor.cli.main", "run", scenario, "--duration", seconds]
     wide = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     with tempfile.TemporaryDirectory() as directory:
         reports = [Path(directory, name) for name in ("two.json", "one.json")]

@@ -10,15 +10,12 @@ setup(
     maintainer="Rail Corridor maintainers",
     maintainer_email="maintainers@rail-corridor.example",
     packages=find_packages(include=[package_name, f"{package_name}.*"]),
-    package_data={
-        package_name: ["py.typed", "fastdds.xml", "scenarios/*.yaml"],
-        f"{package_name}.view": ["static/*"],
-    },
+    package_data={"": ["py.typed", "builtin/*.yaml", "fastdds.xml", "static/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
         (f"share/{package_name}", ["package.xml"]),
     ],
     install_requires=["setuptools"],
     zip_safe=False,
-    entry_points={"console_scripts": ["rail = rail_corridor.cli:main"]},
+    entry_points={"console_scripts": ["rail = rail_corridor.cli.main:main"]},
 )

@@ -10,7 +10,7 @@ setup(
     maintainer="Rail Corridor maintainers",
     maintainer_email="maintainers@rail-corridor.example",
     packages=find_packages(include=[package_name, f"{package_name}.*"]),
-    package_data={package_name: ["py.typed", "profiles/*.json", "profiles/train_bus/*.json"]},
+    package_data={"": ["py.typed", "profiles/*.json"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
         (f"share/{package_name}", ["package.xml"]),

@@ -19,11 +19,11 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "wrs = rail_wayside.wrs_node:main",
+            "wrs = rail_wayside.ranging.wrs_node:main",
             "zone_controller = rail_wayside.zone_controller_node:main",
-            "track_code_transmitter = rail_wayside.track_code_transmitter_node:main",
-            "cbtc_base_station = rail_wayside.cbtc_base_station_node:main",
-            "reference_station = rail_wayside.reference_station_node:main",
+            "track_code_transmitter = rail_wayside.track_code.transmitter_node:main",
+            "cbtc_base_station = rail_wayside.train_radio.base_station_node:main",
+            "reference_station = rail_wayside.doppler.reference_station_node:main",
         ],
     },
 )

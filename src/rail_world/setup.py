@@ -20,12 +20,12 @@ setup(
     entry_points={
         "console_scripts": [
             "world = rail_world.world_node:main",
-            "radio_medium = rail_world.radio_medium_node:main",
-            "rail_medium = rail_world.rail_medium_node:main",
-            "cbtc_medium = rail_world.cbtc_medium_node:main",
-            "backbone = rail_world.backbone_node:main",
-            "reference_medium = rail_world.reference_medium_node:main",
-            "bus_medium = rail_world.bus_medium_node:main",
+            "radio_medium = rail_world.ranging.medium_node:main",
+            "rail_medium = rail_world.track_code.medium_node:main",
+            "cbtc_medium = rail_world.train_radio.medium_node:main",
+            "backbone = rail_world.train_radio.backbone_node:main",
+            "reference_medium = rail_world.doppler.medium_node:main",
+            "bus_medium = rail_world.train_bus.medium_node:main",
         ],
     },
 )

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from rail_corridor.host import NODE_CLASSES
+from rail_corridor.run.host import NODE_CLASSES
 
 ROOT = Path(__file__).resolve().parents[2]
 PYPROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")  # tomllib is Python 3.11
 PACKAGES = sorted(path.parent.name for path in (ROOT / "src").glob("*/package.xml"))
-NODES: dict[str, dict[str, str]] = {"rail_corridor": {"rail": "rail_corridor.cli:main"}}
+NODES: dict[str, dict[str, str]] = {"rail_corridor": {"rail": "rail_corridor.cli.main:main"}}
 for _kind, (_module, _) in NODE_CLASSES.items():
     NODES.setdefault(_module.split(".")[0], {})[_kind] = f"{_module}:main"
 
@@ -99,8 +99,8 @@ def test_manifest_depends_on_our_packages_that_are_imported(package: str) -> Non
 
 def test_pyproject_maps_every_package_and_the_command() -> None:
     for package in PACKAGES:
-        assert f'{package} = "src/{package}/{package}"' in PYPROJECT
-    assert 'rail = "rail_corridor.cli:main"' in PYPROJECT
+        assert f'"src/{package}",' in PYPROJECT
+    assert 'rail = "rail_corridor.cli.main:main"' in PYPROJECT
 
 
 def test_workspace_source_is_a_relative_link() -> None:

@@ -14,9 +14,9 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from rail_msgs_py import topics
-from rail_msgs_py.qos import LATCHED
-from rail_msgs_py.topics import Topic
+from rail_msgs_py.topics.qos import LATCHED
+from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, READY
+from rail_msgs_py.topics.topic import Topic
 
 #: Only ever reached by a test that fails.
 PATIENCE_S = 30.0
@@ -45,9 +45,9 @@ class Graph:
         self._reached = Future()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.bystander.create_timer(0.002, self._look, clock=steady)
-        self.ready = self.mailbox(topics.READY)
-        self.failed = self.mailbox(topics.FAILED)
-        self.diagnostics = self.mailbox(topics.DIAGNOSTICS)
+        self.ready = self.mailbox(READY)
+        self.failed = self.mailbox(FAILED)
+        self.diagnostics = self.mailbox(DIAGNOSTICS)
 
     def add(self, node: Any) -> Any:
         """Spin a node, switched on if it is equipment; it ends with the test."""

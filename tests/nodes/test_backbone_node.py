@@ -10,17 +10,24 @@ import pytest
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray, Header
 
-from rail_corridor.plan import CONTROLLER, make_plan
-from rail_corridor.scenario import Scenario, load_scenario
-from rail_msgs_py import topics
-from rail_msgs_py.cbtc_topics import BACKBONE
+from rail_corridor.run.plan import CONTROLLER, make_plan
+from rail_corridor.scenario.model import Scenario, load_scenario
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.stamps import clock_to_cdr, to_ns
 from rail_msgs_py.table import Table
-from rail_msgs_py.telegrams import Telegrams
-from rail_world.backbone import Backbone
-from rail_world.backbone_node import BackboneNode
-from rail_world.frame_threats import Threat
+from rail_msgs_py.topics.tick import CLOCK, DONE
+from rail_msgs_py.topics.train_radio import (
+    BACKBONE,
+    BACKBONE_DOWN,
+    BACKBONE_UP,
+    DOWN_TELEGRAMS,
+    STRIKES,
+    UP_TELEGRAMS,
+)
+from rail_msgs_py.train_radio.telegrams import Telegrams
+from rail_world.train_radio.backbone import Backbone
+from rail_world.train_radio.backbone_node import BackboneNode
+from rail_world.train_radio.frame_threats import Threat
 from rail_world.world_file import read_world_file
 
 TICK_NS = 250_000_000
@@ -44,13 +51,13 @@ class Network:
     def __init__(self, graph: Any, directory: Path, threats: list[str], **more: Any) -> None:
         self.graph = graph
         given = {**parameters(directory, threats), **more}
-        self._clock = graph.sender(topics.CLOCK)
-        self._heard = {b: graph.sender(topics.UP_TELEGRAMS, base=b) for b in BASES}
-        self._ordered = {b: graph.sender(topics.DOWN_TELEGRAMS, base=b) for b in BASES}
-        self.up = {b: graph.mailbox(topics.BACKBONE_UP, base=b) for b in BASES}
-        self.down = {b: graph.mailbox(topics.BACKBONE_DOWN, base=b) for b in BASES}
-        self.strikes = graph.mailbox(topics.STRIKES, raw=True)
-        self.done = graph.mailbox(topics.DONE, raw=True, node=BACKBONE)
+        self._clock = graph.sender(CLOCK)
+        self._heard = {b: graph.sender(UP_TELEGRAMS, base=b) for b in BASES}
+        self._ordered = {b: graph.sender(DOWN_TELEGRAMS, base=b) for b in BASES}
+        self.up = {b: graph.mailbox(BACKBONE_UP, base=b) for b in BASES}
+        self.down = {b: graph.mailbox(BACKBONE_DOWN, base=b) for b in BASES}
+        self.strikes = graph.mailbox(STRIKES, raw=True)
+        self.done = graph.mailbox(DONE, raw=True, node=BACKBONE)
         graph.add(BackboneNode(context=graph.context, parameters=given))
         graph.connect(BACKBONE)
 

@@ -9,16 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rail_corridor.plan import MEDIUM, Plan, make_plan
-from rail_corridor.scenario import load_scenario
-from rail_msgs_py import topics
+from rail_corridor.run.plan import MEDIUM, Plan, make_plan
+from rail_corridor.scenario.model import load_scenario
 from rail_msgs_py.failures import failure
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.table import Table
+from rail_msgs_py.topics.ranging import LINKS, VRS_RX, VRS_TX, WRS_RX, WRS_TX
+from rail_msgs_py.topics.tick import DONE, FAILED
+from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.waveform import Waveform, silence
-from rail_signals.line_receiver import LineReceiver
-from rail_signals.ranging_signal import RangingSignal, modulate
-from rail_world.radio_medium_node import RadioMediumNode
+from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.signal import RangingSignal, modulate
+from rail_world.ranging.medium_node import RadioMediumNode
 
 SIGNAL = RangingSignal()
 TICK_NS = 100_000_000
@@ -34,16 +36,14 @@ class Air:
     def __init__(self, graph: Any, plan: Plan, timeout_s: float = 20.0) -> None:
         self.graph = graph
         self.stations = plan.world.radio.stations
-        self._state = graph.sender(topics.STATE)
+        self._state = graph.sender(STATE)
         parts = [{"site": s.site, "zone": s.zone} for s in self.stations]
-        self._down = [graph.sender(topics.WRS_TX, **part) for part in parts]
-        self._up = graph.sender(topics.VRS_TX, train=TRAIN)
-        self.to_train = {
-            c: graph.mailbox(topics.VRS_RX, raw=True, train=TRAIN, channel=c) for c in (1, 3)
-        }
-        self.to_station = [graph.mailbox(topics.WRS_RX, raw=True, **part) for part in parts]
-        self.links = graph.mailbox(topics.LINKS)
-        self.done = graph.mailbox(topics.DONE, raw=True, node=MEDIUM)
+        self._down = [graph.sender(WRS_TX, **part) for part in parts]
+        self._up = graph.sender(VRS_TX, train=TRAIN)
+        self.to_train = {c: graph.mailbox(VRS_RX, raw=True, train=TRAIN, channel=c) for c in (1, 3)}
+        self.to_station = [graph.mailbox(WRS_RX, raw=True, **part) for part in parts]
+        self.links = graph.mailbox(LINKS)
+        self.done = graph.mailbox(DONE, raw=True, node=MEDIUM)
         (spec,) = (spec for spec in plan.nodes if spec.name == MEDIUM)
         parameters = {**spec.parameters, "timeout_s": timeout_s}
         graph.add(RadioMediumNode(context=graph.context, parameters=parameters))
@@ -51,11 +51,11 @@ class Air:
 
     def move(self, tick: int, chainage_m: float, on_line: float = 1.0) -> None:
         """Publish where the train is; the plain line runs east along the x axis."""
-        row = dict.fromkeys(topics.STATE_COLUMNS, 0.0)
+        row = dict.fromkeys(STATE.columns, 0.0)
         row |= {"path_m": chainage_m, "x_m": chainage_m, "on_line": on_line}
         row["chainage_m"] = chainage_m
-        values = np.array([[row[column] for column in topics.STATE_COLUMNS]])
-        self._state(Table(tick * TICK_NS, (TRAIN,), topics.STATE_COLUMNS, values).to_msg())
+        values = np.array([[row[column] for column in STATE.columns]])
+        self._state(Table(tick * TICK_NS, (TRAIN,), STATE.columns, values).to_msg())
 
     def call(self, tick: int, zones: tuple[str, ...] | None = None, quiet: bool = False) -> None:
         """Send the block of every station, or of these zones."""
@@ -173,7 +173,7 @@ def test_a_silent_node_is_named_and_the_corridor_goes_on(graph: Any, plan: Plan)
 def test_who_is_named_failed_by_others_is_not_waited_for(graph: Any, plan: Plan) -> None:
     air = Air(graph, plan)
     every = tuple(station.zone for station in air.stations)
-    tell = graph.sender(topics.FAILED)
+    tell = graph.sender(FAILED)
     air.move(0, 250.0)
     air.call(0, zones=every[1:])
     tell(failure(f"/wayside/{air.stations[0].site}", "process killed by SIGKILL", "a test"))

@@ -8,25 +8,21 @@ from typing import Any
 
 import pytest
 
-from rail_corridor.host import NODE_CLASSES, make_node
-from rail_corridor.observer import Observer
-from rail_corridor.plan import NodeSpec, make_plan
-from rail_corridor.scenario import Overrides, load_scenario
-from rail_corridor.topic_docs import PARAMETERS, document, main, type_name
-from rail_msgs_py import bus_topics, cbtc_topics, positioning_topics, topics
-from rail_msgs_py.topic import Topic
-from rail_msgs_py.topics import ALL, kind_of
+from rail_corridor.cli.topic_docs import PARAMETERS, document, main, type_name
+from rail_corridor.run.host import NODE_CLASSES, make_node
+from rail_corridor.run.observer import Observer
+from rail_corridor.run.plan import NodeSpec, make_plan
+from rail_corridor.scenario.model import Overrides, load_scenario
+from rail_msgs_py.topics import doppler, localizer, track_code, train_bus, train_radio
+from rail_msgs_py.topics.builtin import ALL, kind_of
+from rail_msgs_py.topics.train_radio import BACKBONE_DOWN, BACKBONE_UP, STRIKES
+from rail_msgs_py.topics.world import COMMAND, ODOMETER
 
 TICKS = 12
-RADIO = [topic for topic in vars(cbtc_topics).values() if isinstance(topic, Topic)]
-RAILS = [
-    *(topics.CIRCUIT_TX, topics.CIRCUIT_RX, topics.OCCUPANCY),
-    *(topics.CODE_SENT, topics.CODE_RX, topics.CODE_RECEIVED),
-]
-THREATS = [topics.BACKBONE_DOWN, topics.BACKBONE_UP, topics.STRIKES]
-PLACES = [topic for topic in vars(positioning_topics).values() if isinstance(topic, Topic)]
-BUS = [topic for topic in vars(bus_topics).values() if isinstance(topic, Topic)]
-SUPERVISION = [topics.ODOMETER, topics.COMMAND]
+RADIO, RAILS, BUS = train_radio.TOPICS, track_code.TOPICS, train_bus.TOPICS
+THREATS = [BACKBONE_DOWN, BACKBONE_UP, STRIKES]
+PLACES = [*doppler.TOPICS, *localizer.TOPICS]
+SUPERVISION = [ODOMETER, COMMAND]
 #: Scenarios with every kind of node between them, and the topics that each does without.
 SCENARIOS = {
     "follow_codes": [*RADIO, *PLACES, *BUS],
@@ -126,7 +122,7 @@ def test_the_run_is_whole_and_nothing_was_lost(graph: Any, tmp_path: Path) -> No
 
 def test_the_document_is_fresh() -> None:
     path = Path(__file__).resolve().parents[2] / "docs" / "topics.md"
-    again = "run: python -m rail_corridor.topic_docs docs/topics.md"
+    again = "run: python -m rail_corridor.cli.topic_docs docs/topics.md"
     assert path.read_text(encoding="utf-8") == document(), again
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
-from rail_wayside.wrs_node import WrsNode
+from rail_wayside.ranging.wrs_node import WrsNode
 
 SERVICE = "/wayside/wrs1/change_state"
 OFF, ON = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE

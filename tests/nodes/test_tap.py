@@ -11,13 +11,13 @@ from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
-from rail_corridor.bystander import FULL_NAME, Bystander
-from rail_msgs_py import topics
+from rail_corridor.run.bystander import FULL_NAME, Bystander
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.tap import TappedContext
-from rail_msgs_py.topic import Topic
+from rail_msgs_py.topics.tick import CLOCK, DONE, FAILED, FINISHED, READY
+from rail_msgs_py.topics.topic import Topic
 
 
 class Told:
@@ -50,39 +50,39 @@ def context(told: Told, ros_domain: int) -> Iterator[Any]:
 
 def test_what_is_told_is_what_others_receive(graph: Any, context: Any, told: Told) -> None:
     node = CorridorNode("world", "/", context=context, services=False)
-    heard = graph.mailbox(topics.DONE, raw=True, node="/world/radio_medium")
-    clock = graph.mailbox(topics.CLOCK, raw=True)
-    finished = graph.mailbox(topics.FINISHED)
-    done = node.stream_out(topics.DONE, node="/world/radio_medium")
-    tick, end = node.publisher(topics.CLOCK), node.publisher(topics.FINISHED)
-    failed = node.publisher(topics.FAILED)
+    heard = graph.mailbox(DONE, raw=True, node="/world/radio_medium")
+    clock = graph.mailbox(CLOCK, raw=True)
+    finished = graph.mailbox(FINISHED)
+    done = node.stream_out(DONE, node="/world/radio_medium")
+    tick, end = node.publisher(CLOCK), node.publisher(FINISHED)
+    failed = node.publisher(FAILED)
     graph.wait(lambda: tick.get_subscription_count() and node._connections[0]())
     for stamp_ns in (0, 100_000_000):
         tick.publish(clock_to_cdr(stamp_ns))
         done(header_to_cdr(stamp_ns))
-    message = topics.FINISHED.type(frame_id="world")
+    message = FINISHED.type(frame_id="world")
     end.publish(message)
-    failed.publish(topics.FAILED.type(name="/somebody"))
+    failed.publish(FAILED.type(name="/somebody"))
     graph.wait(lambda: len(heard) == 2 and len(clock) == 2 and finished and graph.failed)
     assert told.messages["/world/radio_medium/done"] == heard
     assert told.messages["/clock"] == clock
     (raw,) = told.messages["/world/finished"]
-    assert deserialize_message(raw, topics.FINISHED.type) == message == finished[0]
+    assert deserialize_message(raw, FINISHED.type) == message == finished[0]
     assert "/failed" not in told.messages
     node.destroy_node()
 
 
 def test_without_a_tap_publishers_are_those_of_ros(graph: Any) -> None:
     node = graph.add(CorridorNode("world", "/", context=graph.context, services=False))
-    assert isinstance(node.publisher(topics.CLOCK), rclpy.publisher.Publisher)
+    assert isinstance(node.publisher(CLOCK), rclpy.publisher.Publisher)
 
 
 def test_a_bystander_tells_what_a_stranger_publishes(graph: Any) -> None:
     told = Told()
-    shared = (topics.READY, topics.FAILED)
+    shared = (READY, FAILED)
     graph.add(Bystander(["/theirs"], told.open, shared, context=graph.context))
     stranger = CorridorNode("theirs", "/", context=graph.context, services=False)
-    tick = stranger.publisher(topics.CLOCK)
+    tick = stranger.publisher(CLOCK)
     own = stranger.create_publisher(String, "/theirs/own", 10)
     stranger.announce_when_connected()
     graph.add(stranger)

@@ -9,20 +9,30 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rail_corridor.plan import Plan, make_plan
-from rail_corridor.scenario import load_scenario
-from rail_msgs_py import topics
+from rail_corridor.run.plan import Plan, make_plan
+from rail_corridor.scenario.model import load_scenario
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.table import Table, TableWriter
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE
+from rail_msgs_py.topics.tick import CLOCK, DONE
+from rail_msgs_py.topics.track_code import (
+    CIRCUIT_RX,
+    CIRCUIT_TX,
+    CODE_RECEIVED,
+    CODE_RX,
+    CODE_SENT,
+    OCCUPANCY,
+)
+from rail_msgs_py.topics.world import COMMAND, ODOMETER, STATE
 from rail_msgs_py.waveform import Waveform
-from rail_onboard.code_supervision_node import CodeSupervisionNode
-from rail_onboard.track_code_receiver_node import TrackCodeReceiverNode
-from rail_signals.track_code_profile import load_profile
-from rail_signals.track_code_signal import FmTransmitter
-from rail_signals.track_code_word import as_number, decode, encode
-from rail_wayside.track_code_transmitter_node import TrackCodeTransmitterNode
-from rail_world.rail_medium_node import RailMediumNode
+from rail_onboard.track_code.receiver_node import TrackCodeReceiverNode
+from rail_onboard.track_code.supervision_node import CodeSupervisionNode
+from rail_signals.track_code.profile import load_profile
+from rail_signals.track_code.signal import FmTransmitter
+from rail_signals.track_code.word import as_number, decode, encode
+from rail_wayside.track_code.transmitter_node import TrackCodeTransmitterNode
+from rail_world.track_code.medium_node import RailMediumNode
 
 TICK_NS = 250_000_000
 RATE_HZ = 16_000.0
@@ -58,12 +68,12 @@ class Circuit:
         name = "/wayside/tc1/track_code"
         given = parameters(plan, name)
         self.ahead = given["ahead"]
-        self.tx = graph.mailbox(topics.CIRCUIT_TX, circuit="tc1")
-        self.sent = graph.mailbox(topics.CODE_SENT, circuit="tc1")
-        self.sensed = graph.mailbox(topics.OCCUPANCY, circuit="tc1")
-        self._clock = graph.sender(topics.CLOCK)
-        self._rx = graph.sender(topics.CIRCUIT_RX, circuit="tc1")
-        self._occupancy = {c: graph.sender(topics.OCCUPANCY, circuit=c) for c in self.ahead}
+        self.tx = graph.mailbox(CIRCUIT_TX, circuit="tc1")
+        self.sent = graph.mailbox(CODE_SENT, circuit="tc1")
+        self.sensed = graph.mailbox(OCCUPANCY, circuit="tc1")
+        self._clock = graph.sender(CLOCK)
+        self._rx = graph.sender(CIRCUIT_RX, circuit="tc1")
+        self._occupancy = {c: graph.sender(OCCUPANCY, circuit=c) for c in self.ahead}
         node = TrackCodeTransmitterNode(
             namespace="/wayside/tc1", context=graph.context, parameters=given
         )
@@ -75,7 +85,7 @@ class Circuit:
         """Give the clock and, but for the first tick, what the circuits ahead sensed."""
         self._clock(clock_to_cdr(tick * TICK_NS))
         for circuit, send in self._occupancy.items() if tick else ():
-            writer = TableWriter((circuit,), topics.OCCUPANCY_COLUMNS)
+            writer = TableWriter((circuit,), OCCUPANCY.columns)
             flag = (occupied or {}).get(circuit, 0.0)
             send(writer.write((tick - 1) * TICK_NS, np.array([[flag, 0.0]])))
         self.graph.wait(lambda: len(self.sent) > tick and len(self.tx) > tick)
@@ -116,8 +126,8 @@ def test_a_circuit_is_occupied_when_its_level_has_gone(graph: Any, plan: Plan) -
 
 
 def test_a_train_understands_the_code_of_its_circuit(graph: Any) -> None:
-    rx = graph.sender(topics.CODE_RX, train="train_1")
-    box = graph.mailbox(topics.CODE_RECEIVED, train="train_1")
+    rx = graph.sender(CODE_RX, train="train_1")
+    box = graph.mailbox(CODE_RECEIVED, train="train_1")
     node = TrackCodeReceiverNode(namespace="/train_1", context=graph.context)
     node.switch_on()
     graph.add(node)
@@ -144,21 +154,21 @@ def test_a_train_understands_the_code_of_its_circuit(graph: Any) -> None:
 
 
 def test_supervision_brakes_without_a_code_and_releases_with_one(graph: Any) -> None:
-    code = graph.sender(topics.CODE_RECEIVED, train="train_1")
-    odometer = graph.sender(topics.ODOMETER, train="train_1")
-    box = graph.mailbox(topics.COMMAND, train="train_1", supervision="code_supervision")
+    code = graph.sender(CODE_RECEIVED, train="train_1")
+    odometer = graph.sender(ODOMETER, train="train_1")
+    box = graph.mailbox(COMMAND, train="train_1", supervision="code_supervision")
     node = CodeSupervisionNode(namespace="/train_1", context=graph.context)
     node.switch_on()
     graph.add(node)
     graph.connect("/train_1/code_supervision")
-    codes = TableWriter(("train_1",), topics.RECEIVED_COLUMNS)
-    wheels = TableWriter(("train_1",), topics.ODOMETER_COLUMNS)
+    codes = TableWriter(("train_1",), CODE_RECEIVED.columns)
+    wheels = TableWriter(("train_1",), ODOMETER.columns)
 
     def tick(number: int, fields: dict[str, int] | None, speed_mps: float) -> dict[str, float]:
-        values = dict.fromkeys(topics.RECEIVED_COLUMNS, 0.0)
+        values = dict.fromkeys(CODE_RECEIVED.columns, 0.0)
         if fields is not None:
             values |= {"carrier_hz": 1700.0, "valid": 1.0, **fields}
-        figures = np.array([[values[name] for name in topics.RECEIVED_COLUMNS]], dtype=float)
+        figures = np.array([[values[name] for name in CODE_RECEIVED.columns]], dtype=float)
         code(codes.write(number * TICK_NS, figures))
         odometer(wheels.write(number * TICK_NS, np.array([[0.0, speed_mps]])))
         graph.wait(lambda: len(box) > number)
@@ -175,28 +185,28 @@ def test_supervision_brakes_without_a_code_and_releases_with_one(graph: Any) -> 
 
 
 def test_supervision_judges_the_fastest_that_a_localizer_allows(graph: Any) -> None:
-    code = graph.sender(topics.CODE_RECEIVED, train="train_1")
-    odometer = graph.sender(topics.ODOMETER, train="train_1")
-    localizer = graph.sender(topics.LOCALIZER_STATE, train="train_1")
-    box = graph.mailbox(topics.COMMAND, train="train_1", supervision="code_supervision")
+    code = graph.sender(CODE_RECEIVED, train="train_1")
+    odometer = graph.sender(ODOMETER, train="train_1")
+    localizer = graph.sender(LOCALIZER_STATE, train="train_1")
+    box = graph.mailbox(COMMAND, train="train_1", supervision="code_supervision")
     parameters = {"localizer": True}
     node = CodeSupervisionNode(namespace="/train_1", context=graph.context, parameters=parameters)
     node.switch_on()
     graph.add(node)
     graph.connect("/train_1/code_supervision")
-    columns = topics.RECEIVED_COLUMNS, topics.ODOMETER_COLUMNS, topics.LOCALIZER_COLUMNS
+    columns = CODE_RECEIVED.columns, ODOMETER.columns, LOCALIZER_STATE.columns
     codes, wheels, places = (TableWriter(("train_1",), names) for names in columns)
-    values = dict.fromkeys(topics.RECEIVED_COLUMNS, 0.0) | {"carrier_hz": 1700.0, "valid": 1.0}
+    values = dict.fromkeys(CODE_RECEIVED.columns, 0.0) | {"carrier_hz": 1700.0, "valid": 1.0}
     values |= FIELDS
-    heard = np.array([[values[name] for name in topics.RECEIVED_COLUMNS]], dtype=float)
+    heard = np.array([[values[name] for name in CODE_RECEIVED.columns]], dtype=float)
 
     def tick(number: int, believed_mps: float, fastest_mps: float) -> dict[str, float]:
-        place = dict.fromkeys(topics.LOCALIZER_COLUMNS, 0.0)
+        place = dict.fromkeys(LOCALIZER_STATE.columns, 0.0)
         place |= {"low_m": -1.0, "high_m": 1.0, "speed_mps": believed_mps}
         place |= {"speed_low_mps": -0.1, "speed_high_mps": fastest_mps}
         code(codes.write(number * TICK_NS, heard))
         odometer(wheels.write(number * TICK_NS, np.array([[0.0, 0.0]])))  # they stand still
-        row = np.array([[place[name] for name in topics.LOCALIZER_COLUMNS]])
+        row = np.array([[place[name] for name in LOCALIZER_STATE.columns]])
         localizer(places.write(number * TICK_NS, row))
         graph.wait(lambda: len(box) > number)
         return rows(box)
@@ -215,18 +225,18 @@ def to_ns_of(message: Any) -> int:
 
 def test_the_rails_carry_a_code_to_the_train_in_the_circuit(graph: Any, plan: Plan) -> None:
     given = parameters(plan, "/world/rail_medium")
-    state = graph.sender(topics.STATE)
+    state = graph.sender(STATE)
     circuits = [f"tc{number}" for number in range(1, 11)]
-    send = {c: graph.sender(topics.CIRCUIT_TX, circuit=c) for c in circuits}
-    ends = {c: graph.mailbox(topics.CIRCUIT_RX, circuit=c) for c in circuits}
-    heard = {t: graph.mailbox(topics.CODE_RX, train=t) for t in ("leader", "follower")}
-    graph.mailbox(topics.DONE, raw=True, node="/world/rail_medium")
+    send = {c: graph.sender(CIRCUIT_TX, circuit=c) for c in circuits}
+    ends = {c: graph.mailbox(CIRCUIT_RX, circuit=c) for c in circuits}
+    heard = {t: graph.mailbox(CODE_RX, train=t) for t in ("leader", "follower")}
+    graph.mailbox(DONE, raw=True, node="/world/rail_medium")
     graph.add(RailMediumNode(context=graph.context, parameters=given))
     graph.connect("/world/rail_medium")
-    values = np.zeros((2, len(topics.STATE_COLUMNS)))
-    values[:, topics.STATE_COLUMNS.index("chainage_m")] = 900.0, 150.0
-    values[:, topics.STATE_COLUMNS.index("on_line")] = 1.0
-    state(TableWriter(("leader", "follower"), topics.STATE_COLUMNS).write(0, values))
+    values = np.zeros((2, len(STATE.columns)))
+    values[:, STATE.columns.index("chainage_m")] = 900.0, 150.0
+    values[:, STATE.columns.index("on_line")] = 1.0
+    state(TableWriter(("leader", "follower"), STATE.columns).write(0, values))
     time_s = np.arange(SAMPLES) / RATE_HZ
     for number, circuit in enumerate(circuits):
         carrier_hz = (1700.0, 2300.0)[number % 2]

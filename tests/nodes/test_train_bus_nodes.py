@@ -11,25 +11,37 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.srv import ChangeState
 
-from rail_corridor.plan import Plan, make_plan
-from rail_corridor.scenario import load_scenario
-from rail_msgs_py import topics
+from rail_corridor.run.plan import Plan, make_plan
+from rail_corridor.scenario.model import load_scenario
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.table import Table
+from rail_msgs_py.topics.tick import CLOCK, DONE
+from rail_msgs_py.topics.train_bus import (
+    BUS_LINK,
+    BUS_LINKS,
+    BUS_RX,
+    BUS_STATE,
+    BUS_TRACE,
+    BUS_TREND,
+    BUS_TX,
+    BUS_VERDICTS,
+    REFLECTOMETER_RX,
+    REFLECTOMETER_TX,
+)
 from rail_msgs_py.waveform import Waveform, silence
-from rail_onboard.bus_message import PAYLOAD_BYTES, BusMessage
-from rail_onboard.bus_terminal_node import BusTerminalNode
-from rail_onboard.train_bus_monitor_node import TrainBusMonitorNode
-from rail_signals.bus_consist import Deviations
-from rail_signals.bus_faults import BadSplice, BusFault
-from rail_signals.bus_frame import BusFrameFormat
-from rail_signals.bus_receiver import BusFrameReceiver
-from rail_signals.bus_roughness import draw_roughness, roughened
-from rail_signals.bus_train import train_consist
-from rail_signals.measured_trace import step_edge
-from rail_signals.tdr_reflectometer import Reflectometer, measure
-from rail_world.bus_medium_node import BusMediumNode
+from rail_onboard.train_bus.message import PAYLOAD_BYTES, BusMessage
+from rail_onboard.train_bus.monitor_node import TrainBusMonitorNode
+from rail_onboard.train_bus.terminal_node import BusTerminalNode
+from rail_signals.train_bus.consist import Deviations
+from rail_signals.train_bus.faults import BadSplice, BusFault
+from rail_signals.train_bus.frame import BusFrameFormat
+from rail_signals.train_bus.receiver import BusFrameReceiver
+from rail_signals.train_bus.roughness import draw_roughness, roughened
+from rail_signals.train_bus.tdr.measured_trace import step_edge
+from rail_signals.train_bus.tdr.reflectometer import Reflectometer, measure
+from rail_signals.train_bus.train import train_consist
+from rail_world.train_bus.medium_node import BusMediumNode
 
 TICK_NS = 250_000_000
 FRAME = BusFrameFormat(PAYLOAD_BYTES)
@@ -66,10 +78,10 @@ class Terminal:
 
     def __init__(self, graph: Any, end: str) -> None:
         self.graph, self.end, self.name = graph, end, f"/train_1/bus_{end}"
-        self.tx = graph.mailbox(topics.BUS_TX, train="train_1", end=end)
-        self.link = graph.mailbox(topics.BUS_LINK, train="train_1", end=end)
-        self._clock = graph.sender(topics.CLOCK)
-        self._rx = graph.sender(topics.BUS_RX, train="train_1", end=end)
+        self.tx = graph.mailbox(BUS_TX, train="train_1", end=end)
+        self.link = graph.mailbox(BUS_LINK, train="train_1", end=end)
+        self._clock = graph.sender(CLOCK)
+        self._rx = graph.sender(BUS_RX, train="train_1", end=end)
         node = BusTerminalNode(f"bus_{end}", context=graph.context, parameters={"end": end})
         node.switch_on()
         graph.add(node)
@@ -141,13 +153,13 @@ def test_a_terminal_that_is_switched_off_is_silent(graph: Any) -> None:
 
 def test_the_cable_carries_frames_both_ways_and_echoes(graph: Any, plan: Plan) -> None:
     train = "train_a"
-    clock = graph.sender(topics.CLOCK)
-    send = {end: graph.sender(topics.BUS_TX, train=train, end=end) for end in ("head", "tail")}
-    heard = {end: graph.mailbox(topics.BUS_RX, train=train, end=end) for end in ("head", "tail")}
-    probe = graph.sender(topics.REFLECTOMETER_TX, train=train)
-    echo = graph.mailbox(topics.REFLECTOMETER_RX, train=train)
-    links = graph.mailbox(topics.BUS_LINKS)
-    done = graph.mailbox(topics.DONE, raw=True, node="/world/bus_medium")
+    clock = graph.sender(CLOCK)
+    send = {end: graph.sender(BUS_TX, train=train, end=end) for end in ("head", "tail")}
+    heard = {end: graph.mailbox(BUS_RX, train=train, end=end) for end in ("head", "tail")}
+    probe = graph.sender(REFLECTOMETER_TX, train=train)
+    echo = graph.mailbox(REFLECTOMETER_RX, train=train)
+    links = graph.mailbox(BUS_LINKS)
+    done = graph.mailbox(DONE, raw=True, node="/world/bus_medium")
     given = parameters(plan, "/world/bus_medium")
     graph.add(BusMediumNode(context=graph.context, parameters=given))
     graph.connect("/world/bus_medium")
@@ -196,13 +208,13 @@ class Monitor:
 
     def __init__(self, graph: Any, **given: Any) -> None:
         self.graph = graph
-        self.tx = graph.mailbox(topics.REFLECTOMETER_TX, train="train_1")
-        self.state = graph.mailbox(topics.BUS_STATE, train="train_1")
-        self.trace = graph.mailbox(topics.BUS_TRACE, train="train_1")
-        self.verdicts = graph.mailbox(topics.BUS_VERDICTS, train="train_1")
-        self.trend = graph.mailbox(topics.BUS_TREND, train="train_1")
-        self._clock = graph.sender(topics.CLOCK)
-        self._rx = graph.sender(topics.REFLECTOMETER_RX, train="train_1")
+        self.tx = graph.mailbox(REFLECTOMETER_TX, train="train_1")
+        self.state = graph.mailbox(BUS_STATE, train="train_1")
+        self.trace = graph.mailbox(BUS_TRACE, train="train_1")
+        self.verdicts = graph.mailbox(BUS_VERDICTS, train="train_1")
+        self.trend = graph.mailbox(BUS_TREND, train="train_1")
+        self._clock = graph.sender(CLOCK)
+        self._rx = graph.sender(REFLECTOMETER_RX, train="train_1")
         self.consist = train_consist(CARS)
         self.instrument = Reflectometer(self.consist.termination.resistance_ohm)
         self._rng = rng = np.random.default_rng(5)

@@ -10,13 +10,13 @@ import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
-from rail_msgs_py import topics
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.table import Table
+from rail_msgs_py.topics.ranging import VRS_CHANNEL, VRS_RX, VRS_TX
 from rail_msgs_py.waveform import Waveform, silence
-from rail_onboard.vrs_node import VrsNode
-from rail_signals.line_receiver import LineReceiver
-from rail_signals.ranging_signal import RangingSignal, modulate
+from rail_onboard.ranging.vrs_node import VrsNode
+from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.signal import RangingSignal, modulate
 
 SIGNAL = RangingSignal()
 TICK_NS = 100_000_000
@@ -31,9 +31,9 @@ class Vehicle:
     def __init__(self, graph: Any, **parameters: Any) -> None:
         self.graph = graph
         self._rng = np.random.default_rng(1)
-        self.tx = graph.mailbox(topics.VRS_TX, raw=True, train="train_1")
-        self.channels = graph.mailbox(topics.VRS_CHANNEL, train="train_1")
-        self.rx = {c: graph.sender(topics.VRS_RX, train="train_1", channel=c) for c in (1, 3)}
+        self.tx = graph.mailbox(VRS_TX, raw=True, train="train_1")
+        self.channels = graph.mailbox(VRS_CHANNEL, train="train_1")
+        self.rx = {c: graph.sender(VRS_RX, train="train_1", channel=c) for c in (1, 3)}
         self.node = graph.add(VrsNode(context=graph.context, parameters=parameters))
         graph.connect("/train_1/vrs")
 

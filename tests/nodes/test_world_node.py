@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from rclpy.qos import QoSProfile
 
-from rail_corridor.plan import WORLD, Plan, make_plan
-from rail_corridor.scenario import load_scenario
-from rail_msgs_py import topics
+from rail_corridor.run.plan import WORLD, Plan, make_plan
+from rail_corridor.scenario.model import load_scenario
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.position import Position
 from rail_msgs_py.stamps import clock_from_cdr, to_ns
 from rail_msgs_py.table import Table
+from rail_msgs_py.topics.tick import CLOCK, DONE, FINISHED
+from rail_msgs_py.topics.world import CORRIDOR_MARKERS, CORRIDOR_PATH, STATE, TRUTH
 from rail_world.world_node import WorldNode
 
 TICK_NS = 100_000_000
@@ -37,11 +38,11 @@ class World:
             "timeout_s": 20.0,
             **parameters,
         }
-        self.clock = graph.mailbox(topics.CLOCK, raw=True)
-        self.state = graph.mailbox(topics.STATE)
-        self.truth = graph.mailbox(topics.TRUTH, train="train_a")
-        self.finished = graph.mailbox(topics.FINISHED)
-        self.done = {sink: graph.sender(topics.DONE, node=sink) for sink in given["sinks"]}
+        self.clock = graph.mailbox(CLOCK, raw=True)
+        self.state = graph.mailbox(STATE)
+        self.truth = graph.mailbox(TRUTH, train="train_a")
+        self.finished = graph.mailbox(FINISHED)
+        self.done = {sink: graph.sender(DONE, node=sink) for sink in given["sinks"]}
         graph.add(WorldNode(context=graph.context, parameters=given))
         graph.connect(WORLD)
 
@@ -133,8 +134,8 @@ def test_it_waits_for_nodes_to_be_ready_but_not_for_ever(graph: Any, plan: Plan)
 def test_late_joiners_learn_the_map_and_the_end(graph: Any, plan: Plan) -> None:
     world = World(graph, plan, ticks=1, sinks=())
     graph.wait(lambda: world.finished)
-    path = graph.mailbox(topics.CORRIDOR_PATH, track="main")
-    markers = graph.mailbox(topics.CORRIDOR_MARKERS)
+    path = graph.mailbox(CORRIDOR_PATH, track="main")
+    markers = graph.mailbox(CORRIDOR_MARKERS)
     graph.wait(lambda: path and markers)
     poses = path[0].poses
     assert path[0].header.frame_id == "map"
@@ -146,7 +147,7 @@ def test_late_joiners_learn_the_map_and_the_end(graph: Any, plan: Plan) -> None:
 def test_a_reader_with_ros_defaults_hears_the_world(graph: Any, plan: Plan) -> None:
     heard: list[Any] = []
     graph.bystander.create_subscription(
-        topics.TRUTH.type, topics.TRUTH.name(train="train_a"), heard.append, QoSProfile(depth=10)
+        TRUTH.type, TRUTH.name(train="train_a"), heard.append, QoSProfile(depth=10)
     )
     World(graph, plan, ticks=1, sinks=())
     graph.wait(lambda: heard)

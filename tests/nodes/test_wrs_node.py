@@ -11,14 +11,15 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
-from rail_msgs_py import topics
 from rail_msgs_py.parameters import ParameterError
-from rail_msgs_py.range_reading import RangeReading
+from rail_msgs_py.ranging.range_reading import RangeReading
 from rail_msgs_py.stamps import clock_to_cdr
+from rail_msgs_py.topics.ranging import RANGE, WRS_RX, WRS_TX
+from rail_msgs_py.topics.tick import CLOCK
 from rail_msgs_py.waveform import Waveform, silence
-from rail_signals.phase_range import range_to_phase_rad
-from rail_signals.ranging_signal import RangingSignal, modulate
-from rail_wayside.wrs_node import WrsNode
+from rail_signals.ranging.phase_range import range_to_phase_rad
+from rail_signals.ranging.signal import RangingSignal, modulate
+from rail_wayside.ranging.wrs_node import WrsNode
 
 SIGNAL = RangingSignal()
 TICK_NS = 100_000_000
@@ -37,10 +38,10 @@ class Station:
 
     def __init__(self, graph: Any, **parameters: Any) -> None:
         self.graph = graph
-        self.tx = graph.mailbox(topics.WRS_TX, raw=True, **PLACE)
-        self.ranges = graph.mailbox(topics.RANGE, raw=True, **PLACE)
-        self.clock = graph.sender(topics.CLOCK)
-        self.rx = graph.sender(topics.WRS_RX, **PLACE)
+        self.tx = graph.mailbox(WRS_TX, raw=True, **PLACE)
+        self.ranges = graph.mailbox(RANGE, raw=True, **PLACE)
+        self.clock = graph.sender(CLOCK)
+        self.rx = graph.sender(WRS_RX, **PLACE)
         self.node = graph.add(WrsNode("wrs1", context=graph.context, parameters=parameters))
         graph.connect("/wayside/wrs1")
 

@@ -10,13 +10,14 @@ import pytest
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
-from rail_corridor.plan import CONTROLLER, Plan, make_plan
-from rail_corridor.scenario import load_scenario
-from rail_msgs_py import topics
+from rail_corridor.run.plan import CONTROLLER, Plan, make_plan
+from rail_corridor.scenario.model import load_scenario
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.position import Position
-from rail_msgs_py.range_reading import RangeReading
+from rail_msgs_py.ranging.range_reading import RangeReading
 from rail_msgs_py.stamps import clock_to_cdr, to_ns
+from rail_msgs_py.topics.ranging import POSITION, RANGE
+from rail_msgs_py.topics.tick import CLOCK, DONE
 from rail_wayside.zone_controller_node import ZoneControllerNode
 
 TICK_NS = 100_000_000
@@ -32,12 +33,11 @@ class Controller:
         given = {**spec.parameters, **parameters}
         self.places = dict(zip(given["zones"], given["sites"], strict=True))
         self._send = {
-            zone: graph.sender(topics.RANGE, site=site, zone=zone)
-            for zone, site in self.places.items()
+            zone: graph.sender(RANGE, site=site, zone=zone) for zone, site in self.places.items()
         }
-        self._clock = graph.sender(topics.CLOCK)
-        self.positions = graph.mailbox(topics.POSITION, train="train_a")
-        self.done = graph.mailbox(topics.DONE, raw=True, node=CONTROLLER)
+        self._clock = graph.sender(CLOCK)
+        self.positions = graph.mailbox(POSITION, train="train_a")
+        self.done = graph.mailbox(DONE, raw=True, node=CONTROLLER)
         graph.add(ZoneControllerNode(context=graph.context, parameters=given))
         graph.connect(CONTROLLER)
 

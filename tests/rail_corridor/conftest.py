@@ -12,11 +12,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import deserialize_message, serialize_message
 
-from rail_corridor.intake import Intake
-from rail_corridor.mcap_recorder import McapRecorder, Source
-from rail_corridor.plan import Plan, make_plan
-from rail_corridor.recorded_report import report_of
-from rail_corridor.recorder_frames import (
+from rail_corridor.recording.frames import (
     ATTACHMENT,
     CHANNEL,
     MESSAGE,
@@ -27,20 +23,26 @@ from rail_corridor.recorder_frames import (
     channel_frame,
     metadata_frame,
 )
-from rail_corridor.recording_file import RecordingFile
-from rail_corridor.report import make_report, report_text
-from rail_corridor.run_facts import BEGIN, END, Beginning, Ending
-from rail_corridor.scenario import Overrides, Scenario, load_scenario
-from rail_corridor.scenario_files import files_of
-from rail_msgs_py import topics
+from rail_corridor.recording.mcap_file import RecordingFile
+from rail_corridor.recording.mcap_recorder import McapRecorder, Source
+from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
+from rail_corridor.report.from_recording import report_of
+from rail_corridor.report.intake import Intake
+from rail_corridor.report.report import make_report, report_text
+from rail_corridor.run.plan import Plan, make_plan
+from rail_corridor.scenario.model import Overrides, Scenario, load_scenario
+from rail_corridor.scenario.scenario_files import files_of
 from rail_msgs_py.failures import failure
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.message_definition import type_name
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.qos_text import offered_profiles
 from rail_msgs_py.stamps import clock_to_cdr, to_time
 from rail_msgs_py.table import TableWriter
-from rail_msgs_py.topic import Topic
+from rail_msgs_py.topics.qos_text import offered_profiles
+from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
+from rail_msgs_py.topics.tick import CLOCK, DIAGNOSTICS, FAILED, FINISHED
+from rail_msgs_py.topics.topic import Topic
+from rail_msgs_py.topics.world import STATE
 
 TRAIN = "train_a"
 TICKS = 60
@@ -71,40 +73,40 @@ def _health(stamp_ns: int, name: str, level: bytes, message: str) -> bytes:
 def _messages(plan: Plan, ticks: int = TICKS) -> Iterator[Said]:
     """Yield what is said in so many ticks."""
     rng = np.random.default_rng(3)
-    state = TableWriter((TRAIN,), topics.STATE_COLUMNS)
-    links = TableWriter((TRAIN,), topics.LINK_COLUMNS)
+    state = TableWriter((TRAIN,), STATE.columns)
+    links = TableWriter((TRAIN,), LINKS.columns)
     channels = {a.downlink_channel for a in plan.world.radio.stations}
     channel = TableWriter((TRAIN,), tuple(f"c{n}" for n in range(2 + len(channels))))
     position = PositionWriter(TRAIN, "main")
-    here = {name: index for index, name in enumerate(topics.STATE_COLUMNS)}
+    here = STATE.index
     for tick in range(ticks):
         ns, way_m = tick * plan.world.tick_ns, 20.0 + 2.0 * tick
         figures = np.zeros((1, len(here)))
         figures[0, [here["path_m"], here["x_m"], here["chainage_m"]]] = way_m
         figures[0, [here["speed_mps"], here["on_line"]]] = 20.0, 1.0
-        yield Said(topics.STATE, topics.STATE.name(), state.write(ns, figures))
-        yield Said(topics.CLOCK, topics.CLOCK.name(), clock_to_cdr(ns))
+        yield Said(STATE, STATE.name(), state.write(ns, figures))
+        yield Said(CLOCK, CLOCK.name(), clock_to_cdr(ns))
         row = np.array([[1.0, 2.0, -50.0, *[-90.0] * (len(channels) - 1)]])
-        yield Said(topics.VRS_CHANNEL, topics.VRS_CHANNEL.name(train=TRAIN), channel.write(ns, row))
+        yield Said(VRS_CHANNEL, VRS_CHANNEL.name(train=TRAIN), channel.write(ns, row))
         known = tick % 9 != 4
         told = Position(
             *(ns, TRAIN, "main", way_m + 0.2 * rng.standard_normal()),
             *(0.04 if known else math.inf, 20.0, 1.0),
         )
         raw = position.write(told)
-        yield Said(topics.POSITION, topics.POSITION.name(train=TRAIN), raw)
+        yield Said(POSITION, POSITION.name(train=TRAIN), raw)
         snr = np.array([[900.0, 1100.0, 1.0, 2.0]])
-        yield Said(topics.LINKS, topics.LINKS.name(), links.write(ns, snr))
+        yield Said(LINKS, LINKS.name(), links.write(ns, snr))
         if tick == 30:
             for by in ("/world/radio_medium", "the launcher"):
                 raw = bytes(serialize_message(failure("/wayside/wrs3", "silent", by, ns)))
-                yield Said(topics.FAILED, "/failed", raw)
+                yield Said(FAILED, "/failed", raw)
         if tick % 20 == 7:
             for name in ("/wayside/wrs1: zone1", "/train_a/vrs: ranging"):
                 raw = _health(ns, name, DiagnosticStatus.WARN, f"jammed at {tick}")
-                yield Said(topics.DIAGNOSTICS, "/diagnostics", raw)
+                yield Said(DIAGNOSTICS, "/diagnostics", raw)
     if ticks == TICKS:
-        yield Said(topics.FINISHED, "/world/finished", header_to_cdr((ticks - 1) * 100_000_000))
+        yield Said(FINISHED, "/world/finished", header_to_cdr((ticks - 1) * 100_000_000))
 
 
 def _heard(plan: Plan, scenario: Scenario, said: list[Said]) -> Intake:

@@ -20,11 +20,11 @@ from visualization_msgs.msg import MarkerArray
 from rail_msgs_py.cdr_stamp import stamp_reader
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.range_reading import RangeWriter
-from rail_msgs_py.safe_frame import FRAME_BYTES
+from rail_msgs_py.ranging.range_reading import RangeWriter
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.table import TableWriter
-from rail_msgs_py.telegrams import telegrams
+from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES
+from rail_msgs_py.train_radio.telegrams import telegrams
 from rail_msgs_py.waveform import Waveform, silence
 
 STAMP_NS = 12_300_000_000

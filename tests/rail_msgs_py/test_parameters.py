@@ -11,13 +11,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.parameter import Parameter
 
-from rail_msgs_py.parameters import (
-    ParameterError,
-    declare,
-    descriptor,
-    overrides,
-    parameter,
-)
+from rail_msgs_py.parameters import ParameterError, declare, descriptor, overrides, parameter
 
 
 @dataclasses.dataclass(frozen=True)

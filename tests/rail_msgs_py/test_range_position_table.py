@@ -18,7 +18,7 @@ from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension
 from rail_msgs_py import position, table
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.range_reading import RangeReading, RangeWriter
+from rail_msgs_py.ranging.range_reading import RangeReading, RangeWriter
 from rail_msgs_py.stamps import clock_from_cdr, to_ns
 from rail_msgs_py.table import Table, TableWriter
 

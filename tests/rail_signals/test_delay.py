@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rail_signals.delay import fractional_delay, repetition, through_paths
-from rail_signals.ranging_signal import RangingSignal, modulate
+from rail_signals.ranging.signal import RangingSignal, modulate
 
 
 @pytest.mark.parametrize("samples", [960, 3968])

@@ -20,9 +20,9 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
-from rail_corridor.recorded_report import report_of
-from rail_corridor.recording_file import RecordingFile
-from rail_msgs_py.topic import Topic
+from rail_corridor.recording.mcap_file import RecordingFile
+from rail_corridor.report.from_recording import report_of
+from rail_msgs_py.topics.topic import Topic
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Generous: it only makes a test fail that would otherwise hang.
@@ -81,7 +81,10 @@ class Rail:
             (self.directory / f"stderr_{number}").open("w") as stderr,
         ):
             process = subprocess.Popen(
-                [*(command or [sys.executable, "-m", "rail_corridor.cli"]), *map(str, arguments)],
+                [
+                    *(command or [sys.executable, "-m", "rail_corridor.cli.main"]),
+                    *map(str, arguments),
+                ],
                 stdout=stdout,
                 stderr=stderr,
                 text=True,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rail_corridor import cli
+from rail_corridor.cli import main as cli
 
 if TYPE_CHECKING:
     from .conftest import Rail

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from rail_msgs_py import topics
+from rail_msgs_py.topics.tick import CLOCK, OBSERVED
 
 if TYPE_CHECKING:
     from .conftest import Listener, Rail
@@ -22,13 +22,13 @@ def test_a_signal_ends_everything_and_leaves_a_report(
     rail: Rail, listener: Listener, number: signal.Signals
 ) -> None:
     path, recording = rail.directory / "report.json", rail.directory / "run.mcap"
-    clock = listener.listen(topics.CLOCK)
+    clock = listener.listen(CLOCK)
     run = rail.start(
         *("run", "branch", "--rate", 5, "--processes", "site"),
         *("--report", path, "--record", recording),
     )
     # The report acknowledges what it has read: from then on it is connected.
-    observed = listener.listen(topics.OBSERVED)
+    observed = listener.listen(OBSERVED)
     listener.until(lambda: observed)
     connected = len(clock)
     listener.until(lambda: len(clock) > connected + 30)

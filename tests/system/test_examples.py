@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rail_msgs_py import topics
+from rail_msgs_py.topics.tick import DIAGNOSTICS
 
 if TYPE_CHECKING:
     from .conftest import Listener, Rail
@@ -78,7 +78,7 @@ def test_own_estimator(rail: Rail) -> None:
 
 
 def test_switch_off_a_station(rail: Rail, listener: Listener) -> None:
-    diagnostics = listener.listen(topics.DIAGNOSTICS)
+    diagnostics = listener.listen(DIAGNOSTICS)
     corridor = rail.start("run", "plain_line", "--rate", 0.5, "--processes", "site")
     run = rail.start("wrs2", command=example("switch_off_a_station.py"))
     assert rail.finish(run) == 0, rail.errors(run)

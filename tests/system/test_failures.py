@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rail_msgs_py import topics
 from rail_msgs_py.stamps import to_ns
+from rail_msgs_py.topics.tick import CLOCK, FAILED
 
 if TYPE_CHECKING:
     from .conftest import Listener, Rail
@@ -30,8 +30,8 @@ def test_a_killed_process_is_named_and_the_corridor_goes_on(
     rail: Rail, listener: Listener, process: str, node: str
 ) -> None:
     path, recording = rail.directory / "report.json", rail.directory / "run.mcap"
-    failed = listener.listen(topics.FAILED)
-    clock = listener.listen(topics.CLOCK)
+    failed = listener.listen(FAILED)
+    clock = listener.listen(CLOCK)
     run = rail.start(
         *("run", "branch", "--duration", 15, "--rate", 5, "--processes", "site"),
         *("--report", path, "--record", recording),

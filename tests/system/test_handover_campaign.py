@@ -7,8 +7,13 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rail_corridor.campaign import Row
-from rail_corridor.campaign_scenarios import CORRIDORS, MANOEUVRE_KMH, Situation, scenario_data
+from rail_corridor.studies.handover import Row
+from rail_corridor.studies.handover_scenarios import (
+    CORRIDORS,
+    MANOEUVRE_KMH,
+    Situation,
+    scenario_data,
+)
 
 if TYPE_CHECKING:
     from .conftest import Rail

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rail_world.frame_threats import Threat
+from rail_world.train_radio.frame_threats import Threat
 
 if TYPE_CHECKING:
     from .conftest import Rail

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rail_corridor.kill_campaign import row_of
-from rail_corridor.kill_scenarios import draw_case
-from rail_corridor.kills import Kill
+from rail_corridor.run.kills import Kill
+from rail_corridor.studies.kill_scenarios import draw_case
+from rail_corridor.studies.kills import row_of
 
 if TYPE_CHECKING:
     from .conftest import Rail

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from rail_msgs_py import topics
+from rail_msgs_py.topics.tick import CLOCK
 
 if TYPE_CHECKING:
     from .conftest import Listener, Rail
@@ -29,7 +29,7 @@ ECHOES = {
 def test_topics_echo_and_hz_of_a_running_corridor(
     rail: Rail, listener: Listener, wait_until: Callable[..., Any]
 ) -> None:
-    clock = listener.listen(topics.CLOCK)
+    clock = listener.listen(CLOCK)
     run = rail.start("run", "plain_line", "--duration", 600, "--rate", 2, "--processes", "one")
     listener.until(lambda: len(clock) > 2)
 

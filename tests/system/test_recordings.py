@@ -18,9 +18,10 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 from rosbags.highlevel import AnyReader
 
-from rail_msgs_py import topics
-from rail_msgs_py.qos import STREAM
 from rail_msgs_py.stamps import to_ns
+from rail_msgs_py.topics.builtin import kind_of
+from rail_msgs_py.topics.qos import STREAM
+from rail_msgs_py.topics.tick import CLOCK, READY
 
 if TYPE_CHECKING:
     from .conftest import Listener, Rail
@@ -57,7 +58,7 @@ def test_nothing_is_lost_and_a_replay_is_heard_by_live_subscribers(
     streams = {
         name: count
         for name, count in found.items()
-        if (kind := topics.kind_of(name)) and kind.qos is STREAM
+        if (kind := kind_of(name)) and kind.qos is STREAM
     }
     assert len(streams) > 60
     assert {*streams.values()} == {ticks}
@@ -65,7 +66,7 @@ def test_nothing_is_lost_and_a_replay_is_heard_by_live_subscribers(
     assert found["/world/state"] == found["/world/radio_medium/links"] == ticks
     assert (found["/world/finished"], found["/ready"]) == (1, report["nodes"] + 1)
 
-    clock, ready = listener.listen(topics.CLOCK), listener.listen(topics.READY)
+    clock, ready = listener.listen(CLOCK), listener.listen(READY)
     replay = rail.start("replay", path, "--start", 1)
     listener.until(lambda: clock and to_ns(clock[-1].clock) == 3_750_000_000)
     assert rail.finish(replay) == 0, rail.errors(replay)

@@ -7,8 +7,8 @@ import struct
 from collections.abc import Callable
 from typing import Any, Final
 
-from rail_msgs_py.message_definition import type_name
-from rail_msgs_py.stamps import CDR_LITTLE_ENDIAN, clock_from_cdr, seconds_to_ns
+from .message_definition import type_name
+from .stamps import CDR_LITTLE_ENDIAN, clock_from_cdr, seconds_to_ns
 
 #: Serialised messages, or a view of them.
 Raw = bytes | memoryview

@@ -7,9 +7,10 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from rail_msgs_py import topics
-from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.topics.tick import FAILED
+
+from .inbox import TickInbox
+from .stamps import NANOSECONDS
 
 WATCH_PERIOD_S = 0.1
 
@@ -57,8 +58,8 @@ class FailureWatch:
         self._node = node
         self._owners = owners
         self._on_failed = on_failed
-        self._publisher = node.publisher(topics.FAILED)
-        node.listen(topics.FAILED, self._heard)
+        self._publisher = node.publisher(FAILED)
+        node.listen(FAILED, self._heard)
 
     def _heard(self, message: Any) -> None:
         ports = tuple(port for port, owner in self._owners.items() if owner == message.name)

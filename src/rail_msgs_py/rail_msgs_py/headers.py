@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from rail_msgs_py.stamps import CDR_LITTLE_ENDIAN, NANOSECONDS
+from .stamps import CDR_LITTLE_ENDIAN, NANOSECONDS
 
 # Stamp, then an empty frame name: length 1 with its terminating NUL.
 _HEADER = struct.Struct("<4siIIc")

@@ -14,11 +14,12 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from rail_msgs_py import topics
-from rail_msgs_py.parameters import overrides
-from rail_msgs_py.stamps import to_time
-from rail_msgs_py.tap import raw_publish, tapped
-from rail_msgs_py.topic import Topic
+from rail_msgs_py.topics.tick import DIAGNOSTICS, READY
+from rail_msgs_py.topics.topic import Topic
+
+from .parameters import overrides
+from .stamps import to_time
+from .tap import raw_publish, tapped
 
 READY_POLL_S = 0.05
 #: Which services a node offers beside its topics: all, none, or the lifecycle's alone.
@@ -54,7 +55,7 @@ class CorridorMixin:
         """Create what every node has; call once after the node's own constructor."""
         self._connections: list[Callable[[], bool]] = []
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._diagnostics = self.publisher(topics.DIAGNOSTICS)
+        self._diagnostics = self.publisher(DIAGNOSTICS)
         self._health: dict[str, tuple[int, str]] = {}
         self._ready_publisher: Any = None
         self._ready_timer: Any = None
@@ -120,7 +121,7 @@ class CorridorMixin:
         """Publish the node's name on ``/ready`` once all its streams have a counterpart."""
         if condition is not None:
             self._connections.append(condition)
-        self._ready_publisher = self.publisher(topics.READY)
+        self._ready_publisher = self.publisher(READY)
 
         def poll() -> None:
             while self._connections and self._connections[-1]():

@@ -15,7 +15,7 @@ from typing import Any, Final
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 
-from rail_msgs_py.stamps import NANOSECONDS, to_ns
+from .stamps import NANOSECONDS, to_ns
 
 _STAMP = struct.Struct("<iI")
 # Tail of the serialised message: pose 7 + covariance 36, twist 6 + covariance 36.

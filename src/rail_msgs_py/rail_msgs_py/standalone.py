@@ -16,7 +16,7 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from rail_msgs_py.parameters import ParameterError
+from .parameters import ParameterError
 
 # In these wheels the events executor fires no callback without a finite time-out.
 FOREVER_S = 1e6

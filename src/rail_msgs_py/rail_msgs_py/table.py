@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
-from rail_msgs_py.stamps import NANOSECONDS, seconds_to_ns
+from .stamps import NANOSECONDS, seconds_to_ns
 
 
 @dataclass(frozen=True, eq=False)

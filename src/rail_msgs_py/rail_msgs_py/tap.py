@@ -13,7 +13,7 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.serialization import serialize_message
 
-from rail_msgs_py.topic import Topic
+from rail_msgs_py.topics.topic import Topic
 
 #: Takes the serialised messages of one topic.
 Sink = Callable[[bytes], None]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
-from rail_msgs_py.stamps import CDR_LITTLE_ENDIAN, NANOSECONDS, seconds_to_ns
+from .stamps import CDR_LITTLE_ENDIAN, NANOSECONDS, seconds_to_ns
 
 HEADER_VALUES: Final = 4
 LABELS: Final = ("antenna", "sample", "iq")

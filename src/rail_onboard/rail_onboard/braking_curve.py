@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, sqrt
 
-from rail_signals.track_code_scales import GRAVITY_MPS2, LEAST_BRAKING_MPS2, deceleration_mps2
+from rail_signals.track_code.scales import GRAVITY_MPS2, LEAST_BRAKING_MPS2, deceleration_mps2
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rail_signals.phasors import cis, rotation
-from rail_signals.ranging_signal import ComplexArray, FloatArray
+from rail_signals.ranging.signal import ComplexArray, FloatArray
+
+from .phasors import cis, rotation
 
 
 def fractional_delay(blocks: ArrayLike, delay_s: ArrayLike, sample_rate_hz: float) -> ComplexArray:

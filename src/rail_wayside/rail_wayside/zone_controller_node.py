@@ -19,26 +19,34 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py import topics
-from rail_msgs_py.cbtc_topics import BACKBONE
 from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.parameters import ParameterError, declare, parameter
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.range_reading import range_from_cdr
+from rail_msgs_py.ranging.range_reading import range_from_cdr
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
-from rail_msgs_py.telegrams import Telegrams, telegrams
-from rail_wayside.authority_desk import Taken
-from rail_wayside.authority_parameters import AuthorityParameters, desk_of
-from rail_wayside.zone_map import Zone, ZoneMap
-from rail_wayside.zone_tracking import NOT_HEARD, Fix, Reading, ZoneTracker
+from rail_msgs_py.topics.ranging import POSITION, RANGE
+from rail_msgs_py.topics.tick import CLOCK, DONE
+from rail_msgs_py.topics.train_radio import (
+    AUTHORITY,
+    BACKBONE,
+    BACKBONE_UP,
+    DOWN_TELEGRAMS,
+    REPORTS,
+    UP_TELEGRAMS,
+)
+from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
+from rail_wayside.ranging.train_tracker import NOT_HEARD, Fix, Reading, ZoneTracker
+from rail_wayside.ranging.zone_map import Zone, ZoneMap
+from rail_wayside.train_radio.authority_issuer import Taken
+from rail_wayside.train_radio.parameters import AuthorityParameters, desk_of
 
 _CLOCK_PORT = "clock"
-_fields = attrgetter(*topics.REPORT_COLUMNS[1:])
+_fields = attrgetter(*REPORTS.columns[1:])
 
 
 @dataclass(frozen=True)
@@ -115,7 +123,7 @@ class ZoneControllerNode(CorridorNode):
         trains = list(zip(self._p.trains, self._p.entry_zones, strict=True))
         self._tracker = ZoneTracker(zone_map, trains)
         self._positions = {
-            name: self.publisher(topics.POSITION, train=name).publish for name in self._p.trains
+            name: self.publisher(POSITION, train=name).publish for name in self._p.trains
         }
         self._writers: dict[tuple[str, str], PositionWriter] = {}
         owners = {zone.name: f"/wayside/{zone.site}" for zone in zone_map.zones.values()}
@@ -125,13 +133,13 @@ class ZoneControllerNode(CorridorNode):
         self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
         for zone in zone_map.zones.values():
             self.stream_in(
-                topics.RANGE,
+                RANGE,
                 lambda raw, zone=zone.name: self._on_range(zone, raw),
                 site=zone.site,
                 zone=zone.name,
             )
-        self.stream_in(topics.CLOCK, self._on_clock)
-        self._done = self.stream_out(topics.DONE, node=self.get_fully_qualified_name())
+        self.stream_in(CLOCK, self._on_clock)
+        self._done = self.stream_out(DONE, node=self.get_fully_qualified_name())
         self.announce_when_connected()
 
     def _open_desk(self) -> dict[str, str]:
@@ -142,21 +150,19 @@ class ZoneControllerNode(CorridorNode):
         # Without a desk there are no numbers.
         self._numbers = dict(zip(p.trains, p.train_numbers, strict=False))
         self._told = {
-            train: self.publisher(topics.AUTHORITY, train=train).publish
+            train: self.publisher(AUTHORITY, train=train).publish
             for train in (p.trains if self._desk else ())
         }
         self._told_tables = {
-            train: TableWriter((train,), topics.AUTHORITY_COLUMNS) for train in self._told
+            train: TableWriter((train,), AUTHORITY.columns) for train in self._told
         }
-        self._taken = {
-            train: self.publisher(topics.REPORTS, train=train).publish for train in self._told
-        }
-        self._down = {base: self.stream_out(topics.DOWN_TELEGRAMS, base=base) for base in p.bases}
-        heard = topics.BACKBONE_UP if p.backbone else topics.UP_TELEGRAMS
+        self._taken = {train: self.publisher(REPORTS, train=train).publish for train in self._told}
+        self._down = {base: self.stream_out(DOWN_TELEGRAMS, base=base) for base in p.bases}
+        heard = BACKBONE_UP if p.backbone else UP_TELEGRAMS
         for base in p.bases:
             self.stream_in(heard, lambda raw, base=base: self._on_telegrams(base, raw), base=base)
         return {
-            _port(base): BACKBONE if p.backbone else topics.UP_TELEGRAMS.owner(base=base)
+            _port(base): BACKBONE if p.backbone else UP_TELEGRAMS.owner(base=base)
             for base in p.bases
         }
 
@@ -257,13 +263,13 @@ class ZoneControllerNode(CorridorNode):
 @cache
 def _reports_table(count: int) -> TableWriter:
     rows = tuple(str(row) for row in range(1, count + 1))
-    return TableWriter(rows, topics.REPORT_COLUMNS)
+    return TableWriter(rows, REPORTS.columns)
 
 
 def _reports(stamp_ns: int, taken: Sequence[Taken]) -> bytes:
     """Table of the reports taken from a train in a tick."""
     figures = [(sealed_s, *_fields(report)) for sealed_s, report in taken]
-    values = np.array(figures, dtype=np.float64).reshape(len(taken), len(topics.REPORT_COLUMNS))
+    values = np.array(figures, dtype=np.float64).reshape(len(taken), len(REPORTS.columns))
     return _reports_table(len(taken)).write(stamp_ns, values)
 
 

@@ -6,15 +6,15 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from rail_world.bus_description import BusDescription
-from rail_world.cbtc_description import CbtcDescription
-from rail_world.description import JunctionDescription, TrackDescription
-from rail_world.network import Network, build_network
-from rail_world.radio_description import RadioDescription, ZoneExtent
-from rail_world.rail_description import RailDescription
-from rail_world.reference_description import ReferenceDescription
-from rail_world.threat_description import ThreatPeriod
-from rail_world.train_description import TrainDescription
+from rail_world.doppler.description import ReferenceDescription
+from rail_world.line.description import JunctionDescription, TrackDescription
+from rail_world.line.network import Network, build_network
+from rail_world.ranging.description import RadioDescription, ZoneExtent
+from rail_world.track_code.description import RailDescription
+from rail_world.train_bus.description import BusDescription
+from rail_world.train_radio.description import CbtcDescription
+from rail_world.train_radio.threat_description import ThreatPeriod
+from rail_world.trains.description import TrainDescription
 
 
 class TrainStop(BaseModel):

@@ -16,21 +16,31 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Header, String
 
-from rail_msgs_py import topics
 from rail_msgs_py.failures import FailureWatch
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter, figures_from_cdr
-from rail_world.corridor_map import markers, path_of
-from rail_world.drive_command import DriveCommand
-from rail_world.traffic import Traffic
-from rail_world.wheels import Wheels, wheel_errors
-from rail_world.world_file import read_world_file
+from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
+from rail_msgs_py.topics.tick import CLOCK, DONE, FAILED, FINISHED, OBSERVED, READY
+from rail_msgs_py.topics.world import (
+    COMMAND,
+    CORRIDOR_MARKERS,
+    CORRIDOR_PATH,
+    ODOMETER,
+    SCENARIO,
+    STATE,
+    TRUTH,
+)
+from rail_world.line.corridor_map import markers, path_of
+from rail_world.trains.drive_command import DriveCommand
+from rail_world.trains.traffic import Traffic
+from rail_world.trains.wheels import Wheels, wheel_errors
+
+from .world_file import read_world_file
 
 WATCH_PERIOD_S = 0.1
 _NOT_RECEIVED = DriveCommand(emergency_brake=True)
@@ -92,19 +102,19 @@ class WorldNode(CorridorNode):
         self._missing = {*self._p.nodes, self.get_fully_qualified_name()}
         self._finished = False
         names = self._traffic.names
-        self._clock_publisher = self.publisher(topics.CLOCK)
+        self._clock_publisher = self.publisher(CLOCK)
         self._clock = self._clock_publisher.publish
-        self._state = self.publisher(topics.STATE).publish
-        self._state_table = TableWriter(names, topics.STATE_COLUMNS)
-        self._truth = [self.publisher(topics.TRUTH, train=name).publish for name in names]
+        self._state = self.publisher(STATE).publish
+        self._state_table = TableWriter(names, STATE.columns)
+        self._truth = [self.publisher(TRUTH, train=name).publish for name in names]
         self._truth_writers: dict[tuple[str, str], PositionWriter] = {}
-        self._finish = self.publisher(topics.FINISHED)
+        self._finish = self.publisher(FINISHED)
         self._supervisors = {
-            train: topics.COMMAND.owner(train=train, supervision=self._p.supervision)
+            train: COMMAND.owner(train=train, supervision=self._p.supervision)
             for train in self._p.supervised
         }
         self._odometers = {
-            train: self.stream_out(topics.ODOMETER, train=train) for train in self._p.odometers
+            train: self.stream_out(ODOMETER, train=train) for train in self._p.odometers
         }
         errors = wheel_errors(described.seed, described.odometer_error, self._p.odometers)
         self._wheels = {
@@ -112,7 +122,7 @@ class WorldNode(CorridorNode):
             for train, error in errors.items()
         }
         self._odometer_tables = {
-            train: TableWriter((train,), topics.ODOMETER_COLUMNS) for train in self._p.odometers
+            train: TableWriter((train,), ODOMETER.columns) for train in self._p.odometers
         }
         # Until its first command a train stands: what is not received is not permitted.
         self._commands = dict.fromkeys(self._p.supervised, _NOT_RECEIVED)
@@ -121,26 +131,26 @@ class WorldNode(CorridorNode):
         self._watch = FailureWatch(self, {port: port for port in ports}, self._drop_sinks)
         for train, port in self._supervisors.items():
             self.stream_in(
-                topics.COMMAND,
+                COMMAND,
                 lambda raw, port=port: self._on_command(raw, port),
                 train=train,
                 supervision=self._p.supervision,
             )
         for sink in self._p.sinks:
-            self.stream_in(topics.DONE, lambda raw, sink=sink: self._done(raw, sink), node=sink)
+            self.stream_in(DONE, lambda raw, sink=sink: self._done(raw, sink), node=sink)
         if self._p.observed:
-            self.listen(topics.OBSERVED, self._on_observed)
-        self.listen(topics.READY, self._on_ready)
-        self.listen(topics.FAILED, self._on_failed_before_start)
+            self.listen(OBSERVED, self._on_observed)
+        self.listen(READY, self._on_ready)
+        self.listen(FAILED, self._on_failed_before_start)
         self._latched = []
         for name, track in network.tracks.items():
-            publisher = self.publisher(topics.CORRIDOR_PATH, track=name)
+            publisher = self.publisher(CORRIDOR_PATH, track=name)
             publisher.publish(path_of(track))
             self._latched.append(publisher)
-        publisher = self.publisher(topics.CORRIDOR_MARKERS)
+        publisher = self.publisher(CORRIDOR_MARKERS)
         publisher.publish(markers(described.radio.stations, described.zones, network))
         self._latched.append(publisher)
-        publisher = self.publisher(topics.SCENARIO)
+        publisher = self.publisher(SCENARIO)
         publisher.publish(String(data=described.scenario))
         self._latched.append(publisher)
         self._pace: Any = None
@@ -219,7 +229,7 @@ class WorldNode(CorridorNode):
         self._advance()
 
     def _on_command(self, raw: bytes, port: str) -> None:
-        stamp_ns, figures = figures_from_cdr(raw, 1, len(topics.COMMAND_COLUMNS))
+        stamp_ns, figures = figures_from_cdr(raw, 1, len(COMMAND.columns))
         permitted_mps, _, service_brake, emergency_brake = figures[0].tolist()
         command = DriveCommand(
             permitted_mps if self._p.cab_signals else inf,

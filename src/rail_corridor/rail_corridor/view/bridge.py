@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from .frame import Asked, Lists, frame
-from .picture import Picture
+from .live_state import Picture
 from .sensors import zone_topics
 from .switches import Switches, equipment_of, natural
 from .taps import Taps

@@ -11,8 +11,8 @@ from typing import Annotated
 
 import typer
 
-from ..errors import InputError
-from ..middleware import discover_on
+from rail_corridor.errors import InputError
+from rail_corridor.run.middleware import discover_on
 
 #: Domains whose ports lie within the range of a host's.
 MOST_DOMAIN = 232

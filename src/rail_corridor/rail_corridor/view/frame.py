@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rail_msgs_py import topics
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.waveform import Waveform
 
 from . import located
-from .picture import Picture
+from .live_state import Picture
 from .scope import scope
 from .sensors import cards, track_code
 
@@ -139,9 +139,7 @@ def _train(picture: Picture, name: str, writers: Callable[[str], int]) -> dict[s
         if command:
             shown["permitted_kmh"] = _rounded(3.6 * command["permitted_mps"], 0)
             shown["brake"] = next((b for b in _BRAKES if command.get(b, 0.0) > 0.0), "")
-    on_board = located.shown(
-        picture, name, gone=writers(topics.LOCALIZER_STATE.name(train=name)) == 0
-    )
+    on_board = located.shown(picture, name, gone=writers(LOCALIZER_STATE.name(train=name)) == 0)
     if on_board is not None:
         shown["located"] = on_board
     protection = _table_row(picture, f"/{name}/atp/state")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from .located import off_the_truth
 
 if TYPE_CHECKING:
-    from .picture import Picture
+    from .live_state import Picture
 
 MOST_ROWS = 1500
 LEAST_STEP_S = 0.5

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rail_msgs_py import topics
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 
 if TYPE_CHECKING:
-    from .picture import Picture
+    from .live_state import Picture
 
-#: What a position is good for, as ``rail_signals.localizer_claim.Status`` counts it.
+#: What a position is good for, as ``rail_signals.localizer.protection_level.Status`` counts it.
 STATUS = ("unavailable", "unmonitored", "protected")
 _MEANING = {
     "protected": "protected: holds even if any one sensor is wrong",
@@ -67,8 +67,8 @@ class Located:
 
 def located(picture: Picture, train: str) -> Located | None:
     """Newest answer of the localizer of a train, None if there is none."""
-    table = picture.tables.get(topics.LOCALIZER_STATE.name(train=train))
-    if table is None or not table.rows or table.columns != topics.LOCALIZER_COLUMNS:
+    table = picture.tables.get(LOCALIZER_STATE.name(train=train))
+    if table is None or not table.rows or table.columns != LOCALIZER_STATE.columns:
         return None
     row = table.row(table.rows[0])
     status = min(max(int(row["status"]), 0), 2)
@@ -129,8 +129,8 @@ def _words(reason: int, excluded: int) -> tuple[str, tuple[str, ...]]:
     """Reason and excluded sensors; what counts them brings SciPy, which takes time to load."""
     if not reason and not excluded:
         return "", ()
-    from rail_signals.localizer_claim import Reason
-    from rail_signals.localizer_settings import Sensor
+    from rail_signals.localizer.protection_level import Reason
+    from rail_signals.localizer.settings import Sensor
 
     known = {int(member): member.name for member in Reason}
     why = known.get(reason, f"reason {reason}").lower().replace("_", " ") if reason else ""

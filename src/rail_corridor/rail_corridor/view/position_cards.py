@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from rail_msgs_py import topics
 from rail_msgs_py.table import Table
-from rail_msgs_py.topic import Topic
+from rail_msgs_py.topics.doppler import DOPPLER_FIX
+from rail_msgs_py.topics.localizer import TOLD_POSITION
+from rail_msgs_py.topics.topic import Topic
+from rail_msgs_py.topics.train_radio import REPORTS
 
 from .located import Located
 from .units import figure
@@ -35,7 +37,7 @@ def doppler_rows(row: Mapping[str, float]) -> Rows:
     """A position by Doppler shifts, or why there is none."""
     reason, tones = int(row["reason"]), ["tones found", f"{row['tones']:.0f}", ""]
     if reason or not math.isfinite(row["chainage_m"]):
-        from rail_signals.doppler_position import Reason  # brings SciPy, which takes time to load
+        from rail_signals.doppler.solver import Reason  # brings SciPy, which takes time to load
 
         names = {int(member): member.name for member in Reason}
         why = names.get(reason, f"reason {reason}").lower().replace("_", " ")
@@ -82,9 +84,9 @@ def report_rows(row: Mapping[str, float], tracks: Sequence[str]) -> Rows:
 def position_rows(kind: Topic | None, table: Table, tracks: Sequence[str]) -> Rows | None:
     """Rows of a table about positions; None if it is none, or of another version."""
     shown: tuple[tuple[Topic, tuple[str, ...], Callable[[Mapping[str, float]], Rows]], ...] = (
-        (topics.DOPPLER_FIX, topics.DOPPLER_COLUMNS, doppler_rows),
-        (topics.TOLD_POSITION, topics.TOLD_COLUMNS, told_rows),
-        (topics.REPORTS, topics.REPORT_COLUMNS, lambda row: report_rows(row, tracks)),
+        (DOPPLER_FIX, DOPPLER_FIX.columns, doppler_rows),
+        (TOLD_POSITION, TOLD_POSITION.columns, told_rows),
+        (REPORTS, REPORTS.columns, lambda row: report_rows(row, tracks)),
     )
     for topic, columns, rows in shown:
         if kind is topic and table.columns == columns:

@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from rail_msgs_py import topics
 from rail_msgs_py.stamps import seconds_to_ns
 from rail_msgs_py.table import Table
-from rail_signals.track_code_scales import CodeScales
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE
+from rail_signals.track_code.scales import CodeScales
 
+from .live_state import Picture
 from .located import Located, located, off_the_truth
-from .picture import Picture
 from .position_cards import localizer_rows, position_rows
 from .units import Figure, figure
 from .wanted import kind_of, of_train
@@ -137,7 +137,7 @@ def _table_card(
         card["rows"] = _channels(row)
     elif name.endswith("/track_code/message"):
         card["rows"] = track_code(row)
-    elif name == topics.LOCALIZER_STATE.name(train=train) and (said := located(picture, train)):
+    elif name == LOCALIZER_STATE.name(train=train) and (said := located(picture, train)):
         card["rows"] = localizer_rows(said)
         card["gauge"] = _interval(picture, train, said)
         return card

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_msgs_py.waveform import Waveform
-from rail_signals.radio_burst import RadioBurstFormat, RadioBurstReceiver
-from rail_signals.radio_slots import RadioSlots
-from rail_signals.space_time_block import scheme
-from rail_signals.symbol_mapping import constellation
+from rail_signals.train_radio.burst import RadioBurstFormat, RadioBurstReceiver
+from rail_signals.train_radio.slots import RadioSlots
+from rail_signals.train_radio.space_time_block import scheme
+from rail_signals.train_radio.symbol_mapping import constellation
 
 
 class BurstReader:

@@ -13,7 +13,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from rail_msgs_py.qos import LATCHED
+from rail_msgs_py.topics.qos import LATCHED
 
 from .wanted import Tap
 

@@ -6,22 +6,27 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-from rail_msgs_py import topics
-from rail_msgs_py.movement_authority import AUTHORITY_BYTES, MovementAuthority
-from rail_msgs_py.safe_frame import FRAME_BYTES, Kind, payload_of, read_header
-from rail_msgs_py.telegrams import Telegrams
-from rail_msgs_py.train_channel import CONTROLLER_IDENTITY
-from rail_msgs_py.train_report import REPORT_BYTES, LocationReport
+from rail_msgs_py.topics.train_radio import (
+    DOWN_TELEGRAMS,
+    RADIO_TELEGRAMS,
+    TRAIN_TELEGRAMS,
+    UP_TELEGRAMS,
+)
+from rail_msgs_py.train_radio.movement_authority import AUTHORITY_BYTES, MovementAuthority
+from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES, Kind, payload_of, read_header
+from rail_msgs_py.train_radio.telegrams import Telegrams
+from rail_msgs_py.train_radio.train_channel import CONTROLLER_IDENTITY
+from rail_msgs_py.train_radio.train_report import REPORT_BYTES, LocationReport
 
 from .wanted import kind_of
 
 MOST_LINES = 400
 #: Kind of topic -> what happens to a frame there.
 _STAGES = {
-    topics.TRAIN_TELEGRAMS.pattern: "sent by train",
-    topics.UP_TELEGRAMS.pattern: "received at base",
-    topics.DOWN_TELEGRAMS.pattern: "sent to base",
-    topics.RADIO_TELEGRAMS.pattern: "received on board",
+    TRAIN_TELEGRAMS.pattern: "sent by train",
+    UP_TELEGRAMS.pattern: "received at base",
+    DOWN_TELEGRAMS.pattern: "sent to base",
+    RADIO_TELEGRAMS.pattern: "received on board",
 }
 
 
@@ -55,7 +60,7 @@ class TelegramLog:
                     "id": self._count,
                     "t": round(batch.stamp_ns * 1e-9, 3),
                     "stage": _STAGES.get(kind.pattern if kind else "", ""),
-                    "place": topic.split("/")[3 if kind is topics.DOWN_TELEGRAMS else 2]
+                    "place": topic.split("/")[3 if kind is DOWN_TELEGRAMS else 2]
                     if topic.startswith("/wayside/")
                     else topic.split("/")[1],
                     **self.describe(frame),

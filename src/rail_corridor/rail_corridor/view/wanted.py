@@ -10,10 +10,24 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
-from rail_msgs_py import topics
-from rail_msgs_py.qos import LATCHED, STREAM
 from rail_msgs_py.table import Table
-from rail_msgs_py.topic import Topic
+from rail_msgs_py.topics.builtin import kind_of
+from rail_msgs_py.topics.doppler import DOPPLER_FIX
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE
+from rail_msgs_py.topics.qos import LATCHED, STREAM
+from rail_msgs_py.topics.ranging import POSITION, RANGE, VRS_CHANNEL
+from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, FINISHED
+from rail_msgs_py.topics.topic import Topic
+from rail_msgs_py.topics.track_code import CODE_SENT, OCCUPANCY
+from rail_msgs_py.topics.train_radio import (
+    ATP_STATE,
+    AUTHORITY,
+    DOWN_TELEGRAMS,
+    RADIO_TELEGRAMS,
+    TRAIN_TELEGRAMS,
+    UP_TELEGRAMS,
+)
+from rail_msgs_py.topics.world import COMMAND, CORRIDOR_PATH, SCENARIO, STATE
 from rail_msgs_py.waveform import Waveform
 
 ARRAY: Final = "std_msgs/msg/Float64MultiArray"
@@ -24,21 +38,19 @@ TELEGRAM_DEPTH: Final = 8
 
 #: Read for every train and circuit.
 OVERVIEW: Final = (
-    *(topics.POSITION, topics.VRS_CHANNEL, topics.COMMAND, topics.ATP_STATE, topics.AUTHORITY),
-    *(topics.OCCUPANCY, topics.CODE_SENT, topics.LOCALIZER_STATE),
+    *(POSITION, VRS_CHANNEL, COMMAND, ATP_STATE, AUTHORITY),
+    *(OCCUPANCY, CODE_SENT, LOCALIZER_STATE),
 )
 #: Read always, also before there is a corridor.
-STANDING: Final = (
-    *(topics.STATE, topics.SCENARIO, topics.FINISHED, topics.FAILED, topics.DIAGNOSTICS),
-)
+STANDING: Final = (*(STATE, SCENARIO, FINISHED, FAILED, DIAGNOSTICS),)
 #: Estimates that are kept for the report, and waited for on board as well.
-AWAITED_ESTIMATES: Final = (topics.COMMAND, topics.DOPPLER_FIX, topics.LOCALIZER_STATE)
+AWAITED_ESTIMATES: Final = (COMMAND, DOPPLER_FIX, LOCALIZER_STATE)
 TELEGRAMS: Final = (
-    *(topics.TRAIN_TELEGRAMS, topics.RADIO_TELEGRAMS),
-    *(topics.DOWN_TELEGRAMS, topics.UP_TELEGRAMS),
+    *(TRAIN_TELEGRAMS, RADIO_TELEGRAMS),
+    *(DOWN_TELEGRAMS, UP_TELEGRAMS),
 )
 
-kind_of = lru_cache(maxsize=20_000)(topics.kind_of)
+kind_of = lru_cache(maxsize=20_000)(kind_of)
 
 
 @dataclass(frozen=True)
@@ -82,7 +94,7 @@ def wanted(
     taps = {
         topic.name(): Tap(
             topic.type,
-            STATE_DEPTH if topic is topics.STATE else topic.qos.depth,
+            STATE_DEPTH if topic is STATE else topic.qos.depth,
             latched=topic.qos is LATCHED,
         )
         for topic in STANDING
@@ -91,7 +103,7 @@ def wanted(
     telegrams = any(wish.telegrams for wish in wishes)
     for name, types in names.items():
         kind = kind_of(name)
-        if kind is topics.CORRIDOR_PATH:
+        if kind is CORRIDOR_PATH:
             taps[name] = Tap(kind.type, latched=True)
         elif kind in OVERVIEW:
             if ticking or not awaited(kind):
@@ -100,13 +112,13 @@ def wanted(
             if telegrams and ticking:
                 taps[name] = Tap(kind.type, TELEGRAM_DEPTH)
         elif of_train(name) in trains and is_table(kind, types) and (ticking or not awaited(kind)):
-            taps[name] = Tap(topics.STATE.type)
+            taps[name] = Tap(STATE.type)
     if ticking:
         for train in trains:
-            taps.update((n, Tap(topics.RANGE.type)) for n in zones.get(train, ()) if n in names)
+            taps.update((n, Tap(RANGE.type)) for n in zones.get(train, ()) if n in names)
         for wish in wishes:
             if ARRAY in names.get(wish.scope, ()):
-                taps[wish.scope] = Tap(topics.STATE.type)
+                taps[wish.scope] = Tap(STATE.type)
     return taps
 
 

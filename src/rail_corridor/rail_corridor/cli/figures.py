@@ -1,0 +1,84 @@
+"""``rail figures``: every figure from the code, those of a run from its recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .usage import UsageError, check_library, check_writable
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command()(figures)
+
+
+def figures(
+    directory: Annotated[
+        Path, typer.Argument(help="Where the pictures go.", metavar="[OUTDIR]")
+    ] = Path("figures"),
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", help="Draw these, as 'run_*'; repeatable.", metavar="NAME"),
+    ] = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option("--from", help="A recording: the figures of that run.", metavar="FILE.mcap"),
+    ] = None,
+    listing: Annotated[
+        bool, typer.Option("--list", help="Show names and captions; draw nothing.")
+    ] = False,
+) -> None:
+    """Draw the figures of the source documents, of the project and of a run, from the code."""
+    if directory.exists() and not directory.is_dir():
+        raise UsageError(f"OUTDIR: {directory}: is not a directory")
+    if not listing:
+        check_writable("OUTDIR", directory / "any" if directory.is_dir() else directory)
+    if recording is not None:
+        check_library()
+
+    from rail_corridor.figures import run as run_figures
+    from rail_corridor.figures.catalogue import ELSEWHERE, FIGURES, draw, write_index
+
+    captions = {name: one.caption for name, one in (FIGURES | run_figures.FIGURES).items()}
+    wanted = _chosen(captions, only)
+    if listing:
+        for name in wanted:
+            typer.echo(f"{name}\n    {captions[name]}")
+        for what, how in ELSEWHERE.items():
+            typer.echo(f"elsewhere: {what}: {how}")
+        return
+    of_run = [name for name in wanted if name in run_figures.FIGURES]
+    found = dict(FIGURES)
+    if recording is not None and of_run:
+        from rail_corridor.recording.mcap_file import RecordingFile
+        from rail_corridor.report.from_recording import run_of
+
+        with RecordingFile(recording) as file:
+            run = run_of(file)
+        found |= run_figures.pictures_of(run)
+    pictures = {name: found[name] for name in wanted if name in found}
+    for path in draw(directory, pictures):
+        typer.echo(path)
+    if pictures:
+        typer.echo(write_index(directory, pictures))
+    if of_run and recording is None:
+        typer.echo(
+            f"not drawn: {', '.join(of_run)}: they need a run, as of 'rail run moving_block "
+            "--record run.mcap', then 'rail figures --from run.mcap'"
+        )
+    elif missing := [name for name in of_run if name not in pictures]:
+        typer.echo(f"not drawn: {', '.join(missing)}: the run has nothing for them")
+
+
+def _chosen(names: Iterable[str], patterns: list[str] | None) -> list[str]:
+    """Names that fit any of the patterns, all without any; UsageError for one that fits none."""
+    names = list(names)
+    for pattern in patterns or ():
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise UsageError(f"--only: {pattern!r}: is none of {', '.join(names)}")
+    return [n for n in names if not patterns or any(fnmatchcase(n, p) for p in patterns)]

@@ -1,0 +1,295 @@
+"""The ``rail`` command."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+# One thread for linear algebra: two cores are shared by many nodes, and the bits of a sum must
+# not depend on how many threads computed it. Has to be set before NumPy is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import typer
+
+from rail_corridor.view.command import view
+
+from .figures import add_to as add_figures
+from .recordings import add_to as add_recordings
+from .studies import add_to as add_studies
+from .usage import (
+    ScenarioArgument,
+    TrackOption,
+    UsageError,
+    check_choice,
+    check_library,
+    check_writable,
+)
+from .workshop import add_to as add_workshop
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="A railway signalling corridor on ROS 2, at waveform level.",
+)
+
+SeedOption = Annotated[
+    int | None, typer.Option("--seed", help="Seed of every random draw.", metavar="N")
+]
+DurationOption = Annotated[
+    float | None, typer.Option("--duration", help="Simulated time, in seconds.", metavar="S")
+]
+TrainsOption = Annotated[
+    int | None, typer.Option("--trains", help="Number of trains.", metavar="N")
+]
+ZoneOption = Annotated[
+    float | None,
+    typer.Option("--zone-length", help="No zone longer than this, in metres.", metavar="M"),
+]
+ReverseOption = Annotated[
+    bool,
+    typer.Option("--reverse", help="Trains run the other way, from the other end of their track."),
+]
+
+
+def _load(
+    scenario: str,
+    seed: int | None,
+    duration: float | None,
+    track: Path | None,
+    trains: int | None,
+    zone_length: float | None,
+    reverse: bool,
+) -> object:
+    from rail_corridor.scenario.model import Overrides, load_scenario
+
+    overrides = Overrides(
+        seed=seed,
+        duration_s=duration,
+        track=track,
+        trains=trains,
+        zone_length_m=zone_length,
+        reverse=reverse,
+    )
+    return load_scenario(scenario, overrides=overrides)
+
+
+@app.command()
+def run(
+    scenario: ScenarioArgument,
+    duration: DurationOption = None,
+    rate: Annotated[
+        float,
+        typer.Option(
+            "--rate", help="Simulated seconds per second; 0 = as fast as possible.", metavar="R"
+        ),
+    ] = 0.0,
+    seed: SeedOption = None,
+    processes: Annotated[
+        str | None,
+        typer.Option(
+            "--processes",
+            help="one process, one per site and train, or one per node: one, site, node.",
+            metavar="HOW",
+        ),
+    ] = None,
+    track: TrackOption = None,
+    trains: TrainsOption = None,
+    zone_length: ZoneOption = None,
+    reverse: ReverseOption = False,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", help="Write the report as JSON.", metavar="FILE.json"),
+    ] = None,
+    only: Annotated[
+        str | None,
+        typer.Option(
+            "--only",
+            help="Run one part here, the other on another host: wayside, onboard.",
+            metavar="PART",
+        ),
+    ] = None,
+    external: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--external",
+            help="Do not start this node but wait for yours of the same name; repeatable.",
+            metavar="NODE",
+        ),
+    ] = None,
+    timeout: Annotated[
+        float,
+        typer.Option(
+            "--timeout", help="A node silent for so many seconds is given up.", metavar="S"
+        ),
+    ] = 30.0,
+    kill: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--kill", help="Kill this node at this simulated time; repeatable.", metavar="NODE@S"
+        ),
+    ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option("--record", help="Record every topic.", metavar="FILE.mcap"),
+    ] = None,
+    switches: Annotated[
+        bool | None,
+        typer.Option(
+            "--switches/--no-switches",
+            help="Whether equipment can be switched off by its lifecycle service, which takes "
+            "time to start where many nodes share a process; the default is to, with --rate.",
+        ),
+    ] = None,
+) -> None:
+    """Run a corridor, and report."""
+    import math
+
+    check_choice("--processes", processes, ("one", "site", "node"))
+    check_choice("--only", only, ("wayside", "onboard"))
+    if not (math.isfinite(rate) and 0.0 <= rate <= 1e6):
+        raise UsageError(f"--rate: {rate}: must be from 0 to 1e6")
+    if not (math.isfinite(timeout) and 0.5 <= timeout <= 3600.0):
+        raise UsageError(f"--timeout: {timeout}: must be from 0.5 to 3600 s")
+    if report is not None:
+        check_writable("--report", report)
+    if record is not None:
+        check_writable("--record", record)
+        check_library()
+    from rail_corridor.run.kills import parse_kill
+
+    kills = tuple(parse_kill(text) for text in kill or ())
+    loaded = _load(scenario, seed, duration, track, trains, zone_length, reverse)
+
+    from rich.console import Console
+
+    from rail_corridor.run.launcher import RunOptions
+    from rail_corridor.run.launcher import run as run_corridor
+
+    options = RunOptions(  # type: ignore[arg-type]
+        rate,
+        processes,
+        only,
+        report,
+        timeout,
+        tuple(external or ()),
+        kills,
+        record,
+        rate > 0.0 if switches is None else switches,
+    )
+    raise typer.Exit(run_corridor(loaded, options, Console()))  # type: ignore[arg-type]
+
+
+@app.command()
+def check(
+    scenario: ScenarioArgument,
+    duration: DurationOption = None,
+    seed: SeedOption = None,
+    track: TrackOption = None,
+    trains: TrainsOption = None,
+    zone_length: ZoneOption = None,
+    reverse: ReverseOption = False,
+) -> None:
+    """Validate a scenario and show what it would run; starts nothing."""
+    loaded = _load(scenario, seed, duration, track, trains, zone_length, reverse)
+
+    from rich.console import Console
+
+    from rail_corridor.scenario.summary import print_summary
+
+    print_summary(loaded, Console())  # type: ignore[arg-type]
+
+
+@app.command()
+def scenarios() -> None:
+    """List the built-in scenarios."""
+    from rich.console import Console
+
+    from rail_corridor.scenario.summary import print_scenarios
+
+    print_scenarios(Console())
+
+
+@app.command()
+def topics() -> None:
+    """List the topics of the running corridor, and what they carry."""
+    from .live_tools import list_topics
+
+    raise typer.Exit(list_topics())
+
+
+@app.command()
+def echo(
+    topic: Annotated[str, typer.Argument(help="Absolute name of a topic.", metavar="TOPIC")],
+    once: Annotated[bool, typer.Option("--once", help="Stop after one message.")] = False,
+    raw: Annotated[bool, typer.Option("--raw", help="Show the message as it is.")] = False,
+) -> None:
+    """Show the messages of a topic, decoded."""
+    from .live_tools import echo_topic
+
+    raise typer.Exit(echo_topic(topic, once=once, raw=raw))
+
+
+@app.command()
+def hz(
+    topic: Annotated[str, typer.Argument(help="Absolute name of a topic.", metavar="TOPIC")],
+) -> None:
+    """Show how often a topic is published, in wall and in simulated time."""
+    from .live_tools import topic_rate
+
+    raise typer.Exit(topic_rate(topic))
+
+
+app.command()(view)
+
+
+@app.command()
+def bench(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Rows to run; all if none.", metavar="NAME...")
+    ] = None,
+    json: Annotated[
+        Path | None, typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
+    ] = None,
+) -> None:
+    """Run the benchmarks: every ratio is measured side by side in one run."""
+    if json is not None:
+        check_writable("--json", json)
+    from rail_corridor.studies.benchmarks import run_benchmarks
+
+    raise typer.Exit(run_benchmarks(tuple(names or ()), json))
+
+
+add_studies(app)
+add_recordings(app)
+add_workshop(app)
+add_figures(app)
+
+
+def main() -> None:
+    """Entry point: every wrong input is one line and exit code 2."""
+    from rail_corridor.errors import InputError
+
+    # Typer brings its own command-line parser, or uses click: its errors are known by name.
+    usage_errors = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
+
+    try:
+        code = app(standalone_mode=False)
+    except (InputError, UsageError) as error:
+        sys.exit(_refuse(str(error)))
+    except usage_errors as error:
+        sys.exit(_refuse(" ".join(error.format_message().split())))
+    except (typer.Abort, KeyboardInterrupt):
+        sys.exit(130)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _refuse(line: str) -> int:
+    print(f"rail: {line}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    main()

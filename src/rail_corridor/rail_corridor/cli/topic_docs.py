@@ -1,0 +1,193 @@
+"""Documents the topics and the parameters of all nodes, from the tables the nodes themselves use.
+
+``python -m rail_corridor.cli.topic_docs [FILE]`` writes ``docs/topics.md``, or prints it without
+FILE.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import sys
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from rail_msgs_py.message_definition import type_name
+from rail_msgs_py.topics.builtin import ALL
+from rail_msgs_py.topics.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
+from rail_onboard.doppler.positioner_node import DopplerPositionerParameters
+from rail_onboard.localizer.localizer_node import LocalizerParameters
+from rail_onboard.ranging.vrs_node import VrsParameters
+from rail_onboard.track_code.receiver_node import TrackCodeReceiverParameters
+from rail_onboard.track_code.supervision_node import CodeSupervisionParameters
+from rail_onboard.train_bus.monitor_node import TrainBusMonitorParameters
+from rail_onboard.train_bus.terminal_node import BusTerminalParameters
+from rail_onboard.train_radio.atp_node import AtpParameters
+from rail_onboard.train_radio.radio_node import CbtcRadioParameters
+from rail_wayside.doppler.reference_station_node import ReferenceStationParameters
+from rail_wayside.ranging.wrs_node import WrsParameters
+from rail_wayside.track_code.transmitter_node import TrackCodeTransmitterParameters
+from rail_wayside.train_radio.base_station_node import CbtcBaseStationParameters
+from rail_wayside.zone_controller_node import ZoneControllerParameters
+from rail_world.doppler.medium_node import ReferenceMediumParameters
+from rail_world.ranging.medium_node import RadioMediumParameters
+from rail_world.track_code.medium_node import RailMediumParameters
+from rail_world.train_bus.medium_node import BusMediumParameters
+from rail_world.train_radio.backbone_node import BackboneParameters
+from rail_world.train_radio.medium_node import CbtcMediumParameters
+from rail_world.world_node import WorldParameters
+
+#: Kind of node, as in `rail_corridor.run.host.NODE_CLASSES`, and its parameters.
+PARAMETERS: dict[str, Any] = {
+    "world": WorldParameters,
+    "radio_medium": RadioMediumParameters,
+    "wrs": WrsParameters,
+    "zone_controller": ZoneControllerParameters,
+    "vrs": VrsParameters,
+    "rail_medium": RailMediumParameters,
+    "track_code_transmitter": TrackCodeTransmitterParameters,
+    "track_code_receiver": TrackCodeReceiverParameters,
+    "code_supervision": CodeSupervisionParameters,
+    "cbtc_medium": CbtcMediumParameters,
+    "backbone": BackboneParameters,
+    "cbtc_base_station": CbtcBaseStationParameters,
+    "cbtc_radio": CbtcRadioParameters,
+    "atp": AtpParameters,
+    "reference_medium": ReferenceMediumParameters,
+    "reference_station": ReferenceStationParameters,
+    "doppler_positioner": DopplerPositionerParameters,
+    "localizer": LocalizerParameters,
+    "bus_medium": BusMediumParameters,
+    "bus_terminal": BusTerminalParameters,
+    "train_bus_monitor": TrainBusMonitorParameters,
+}
+
+_INTRODUCTION = """\
+# Topics and parameters
+
+Every message is of a standard type: any ROS 2 machine can echo, plot and record it. The names are
+made of the sites, zones, tracks, trains and channels of the scenario. *View* is the class in
+`rail_msgs_py` that turns a message into a typed, frozen object; `rail echo` uses it.
+
+The tables are made from the code by `python docs/refresh.py`, or all of this file by
+`python -m rail_corridor.cli.topic_docs docs/topics.md`; tests compare them with the code and with a
+running graph.
+"""
+
+_PARAMETERS = """\
+## Parameters
+
+Each node takes these as ROS parameters, on the command line or from a parameter file. They are read
+once, when the node starts. A value of the wrong type or out of bounds ends the node with one line
+and exit code 2. Bounds of an array hold for each of its numbers.
+"""
+
+
+def document() -> str:
+    """Return the whole of ``docs/topics.md``."""
+    # The marks are those of docs/refresh.py.
+    begin = "<!-- generated: rail_corridor.cli.topic_docs:tables -->"
+    return f"{_INTRODUCTION}\n{begin}\n{tables()}<!-- end of generated -->\n"
+
+
+def tables() -> str:
+    """Return the generated part: topics, quality of service, parameters of every node."""
+    parts = [topic_table(), qos_table(), _PARAMETERS]
+    return "\n".join([*parts, *(parameter_table(kind) for kind in PARAMETERS)])
+
+
+def topic_table() -> str:
+    """Return the Markdown table of all topics."""
+    rows = ["## Topics\n", "| Topic | Type | View | QoS | From | To |", "|---|---|---|---|---|---|"]
+    for topic in ALL:
+        view = f"`{topic.view.__name__}`" if topic.view else ""
+        name = topic.pattern.replace("{", "<").replace("}", ">")
+        rows.append(
+            f"| `{name}` | `{type_name(topic.type)}` | {view} | {name_of(topic.qos)}"
+            f" | {topic.sender} | {topic.readers} |"
+        )
+    rows.append("\nWhat they carry:\n")
+    rows += [
+        f"- `{topic.pattern.replace('{', '<').replace('}', '>')}`: {topic.text}" for topic in ALL
+    ]
+    return "\n".join(rows) + "\n"
+
+
+def qos_table() -> str:
+    """Return the Markdown table of the quality-of-service profiles."""
+    uses = {
+        "stream": "blocks and readings of a tick, read by nodes that the tick waits for",
+        "estimate": f"also read by the report, which may lag by {OBSERVER_WINDOW_TICKS} ticks",
+        "latched": "state that late joiners must learn",
+    }
+    rows = [
+        "## Quality of service\n",
+        "| Profile | Reliability | Durability | History | For |",
+        "|---|---|---|---|---|",
+    ]
+    for profile in (STREAM, ESTIMATE, LATCHED):
+        reliability = profile.reliability.name.lower()
+        durability = profile.durability.name.lower().replace("_", " ")
+        history = f"{profile.history.name.lower().replace('_', ' ')} {profile.depth}"
+        name = name_of(profile)
+        rows.append(f"| {name} | {reliability} | {durability} | {history} | {uses[name]} |")
+    return "\n".join(rows) + "\n"
+
+
+def parameter_table(kind: str) -> str:
+    """Return the Markdown table of the parameters of one kind of node."""
+    parameters = PARAMETERS[kind]
+    hints = get_type_hints(parameters)
+    rows = [
+        f"### {kind}\n",
+        "| Parameter | Type | Default | Unit | Bounds | Meaning |",
+        "|---|---|---|---|---|---|",
+    ]
+    for field in dataclasses.fields(parameters):
+        about = field.metadata
+        rows.append(
+            f"| `{field.name}` | {_type(hints[field.name])} | {_value(field.default)}"
+            f" | {about['unit']} | {_bounds(about['low'], about['high'])} | {about['text']} |"
+        )
+    return "\n".join(rows) + "\n"
+
+
+def _type(hint: Any) -> str:
+    item = getattr(hint, "__args__", None)
+    names = {float: "double", int: "integer", str: "string", bool: "bool"}
+    return f"{names[item[0]]} array" if item else names[hint]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return f"[{', '.join(_value(item) for item in value)}]"
+    if isinstance(value, float):
+        return f"{value:.12g}" if 1e-3 <= abs(value) < 1e5 or value == 0.0 else f"{value:g}"
+    return str(value) if value != "" else "empty"
+
+
+def _bounds(low: float, high: float) -> str:
+    parts = []
+    if math.isfinite(low):
+        parts.append(f"from {_value(float(low))}")
+    if math.isfinite(high):
+        parts.append(f"to {_value(float(high))}")
+    return " ".join(parts)
+
+
+def main(arguments: list[str]) -> int:
+    """Write or print the document; return the exit code."""
+    if len(arguments) > 1:
+        print("usage: python -m rail_corridor.cli.topic_docs [FILE]", file=sys.stderr)
+        return 2
+    if arguments:
+        Path(arguments[0]).write_text(document(), encoding="utf-8")
+    else:
+        print(document(), end="")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

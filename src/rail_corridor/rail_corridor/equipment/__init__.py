@@ -1,0 +1,1 @@
+"""One folder per kind of equipment, and the registry that knows them."""

@@ -1,0 +1,113 @@
+"""What train control by radio must agree on with the rest of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rail_corridor.errors import InputError
+from rail_corridor.scenario.fault_sections import DeadBaseStation, NetworkThreats, TrainStop
+from rail_signals.train_radio.slots import RadioSlots
+
+from .nodes import burst_format
+from .section import CbtcPlan
+
+if TYPE_CHECKING:
+    from rail_corridor.scenario.model import Scenario
+
+
+def check_cbtc(scenario: Scenario, train_fields: Sequence[str]) -> None:
+    """Raise InputError for the first thing that does not fit train control by radio."""
+    plan = scenario.cbtc
+    _check_faults(scenario)
+    if plan is None:
+        return
+    if scenario.track_circuits is not None:
+        raise InputError(
+            "trains obey either track_circuits or cbtc", field="cbtc", value=plan.scheme
+        )
+    if scenario.junctions:
+        raise InputError(
+            "train control by radio does not go with junctions yet",
+            field="junctions.0.branch",
+            value=scenario.junctions[0].branch,
+        )
+    for train, field in zip(scenario.trains, train_fields, strict=True):
+        reason = "trains with authorities by radio run towards increasing chainage only"
+        if train.direction < 0:
+            raise InputError(reason, field=f"{field}.direction", value=train.direction)
+        if train.reverse_at:
+            raise InputError(reason, field=f"{field}.reverse_at", value=len(train.reverse_at))
+        for name, counted in (
+            ("max_service_brake_mps2", plan.braking_mps2),
+            ("emergency_brake_mps2", plan.emergency_mps2),
+        ):
+            if getattr(train.vehicle, name) < counted:
+                raise InputError(
+                    f"is weaker than the {counted:g} m/s^2 that cbtc counts on",
+                    field=f"{field}.vehicle.{name}",
+                    value=getattr(train.vehicle, name),
+                )
+    _check_signal(scenario, plan)
+    for index, loss in enumerate(plan.losses):
+        track = scenario.network.tracks.get(loss.track)
+        if track is None:
+            raise InputError(
+                "there is no such track", field=f"cbtc.losses.{index}.track", value=loss.track
+            )
+        if loss.to_m > track.length_m:
+            raise InputError(
+                f"{loss.track} ends at {track.length_m:g} m",
+                field=f"cbtc.losses.{index}.to_m",
+                value=loss.to_m,
+            )
+
+
+def _check_signal(scenario: Scenario, plan: CbtcPlan) -> None:
+    rate_hz = plan.symbol_rate_hz * plan.samples_per_symbol
+    if plan.spacing_hz < rate_hz:
+        raise InputError(
+            f"is less than the {rate_hz:g} Hz that a channel takes up",
+            field="cbtc.spacing_hz",
+            value=plan.spacing_hz,
+        )
+    if plan.duplex_hz < plan.channels * plan.spacing_hz:
+        raise InputError(
+            f"is less than the {plan.channels * plan.spacing_hz:g} Hz of all channels",
+            field="cbtc.duplex_hz",
+            value=plan.duplex_hz,
+        )
+    slots = RadioSlots(burst_format(plan), len(scenario.trains))
+    if slots.duration_s > scenario.tick_s:
+        raise InputError(
+            f"the slots of {len(scenario.trains)} trains last {slots.duration_s:g} s, longer than"
+            f" a tick of {scenario.tick_s:g} s",
+            field="cbtc.symbol_rate_hz",
+            value=plan.symbol_rate_hz,
+        )
+
+
+def _check_faults(scenario: Scenario) -> None:
+    trains = [train.name for train in scenario.trains]
+    bases = [base.name for base in scenario.bases]
+    for index, fault in enumerate(scenario.faults):
+        if isinstance(fault, TrainStop) and fault.train not in trains:
+            raise InputError(
+                f"there is no such train, they are {', '.join(trains)}",
+                field=f"faults.{index}.train",
+                value=fault.train,
+            )
+        if not isinstance(fault, DeadBaseStation | NetworkThreats):
+            continue
+        if not bases:
+            raise InputError(
+                "goes with cbtc, of which there is none",
+                field=f"faults.{index}.kind",
+                value=fault.kind,
+            )
+        if isinstance(fault, DeadBaseStation) and fault.base not in bases:
+            raise InputError(
+                f"there is no such base station, they are {bases[0]} ... {bases[-1]}",
+                field=f"faults.{index}.base",
+                value=fault.base,
+            )

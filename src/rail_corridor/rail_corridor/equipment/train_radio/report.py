@@ -1,0 +1,160 @@
+"""From a recording to figures: the train radio, its authorities, and what came of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rail_corridor.equipment.supervision_report import supervision_metrics
+from rail_corridor.report.run_data import FloatArray, Recording
+from rail_corridor.scenario.model import Scenario
+from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, CBTC_LINKS, RADIO_LINK
+from rail_msgs_py.topics.world import STATE
+
+from .threat_metrics import forged_authorities, report_metrics
+
+#: Fractions of its first track at which the passing of a train's front is timed.
+PASSED_AT: Final = tuple(tenth / 10.0 for tenth in range(1, 10))
+
+
+def cbtc_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
+    """Sections ``cbtc`` and ``atp`` of one train."""
+    ticks = recording.ticks
+    mine = recording.state.upto(ticks)[:, index]
+    on_line = mine[:, STATE.index["on_line"]] > 0.0
+    atp = recording.atp.upto(ticks)[:, index]
+    given = recording.authority.upto(ticks)[:, index]
+    radio = recording.radio.upto(ticks)[:, index]
+    links = recording.cbtc_links.upto(ticks)[:, index]
+    front_m = mine[:, STATE.index["chainage_m"]]
+    end_m = _held(
+        atp[:, ATP_STATE.index["end_of_authority_m"]], atp[:, ATP_STATE.index["accepted"]]
+    )
+    speed_mps = np.abs(mine[:, STATE.index["speed_mps"]])
+    passed, withdrawn = _passed(scenario, on_line, front_m, speed_mps, end_m)
+    return {
+        "cbtc": _link(scenario, on_line, atp, given, radio, links)
+        | report_metrics(scenario, recording, index)
+        | _location(on_line, front_m, atp)
+        | {"passed_s": _passed_s(scenario, index, mine, on_line)},
+        "atp": supervision_metrics(scenario, recording, index, on_line)
+        | {"passed_authority": passed, "authority_withdrawn": withdrawn},
+    }
+
+
+def _passed(
+    scenario: Scenario,
+    on_line: NDArray[np.bool_],
+    front_m: FloatArray,
+    speed_mps: FloatArray,
+    end_m: FloatArray,
+) -> tuple[int, int]:
+    """Ticks in which a moving train was past its end, and authorities withdrawn.
+
+    One is withdrawn if it is cut to where no brake can stop the train any more, as when the wayside
+    finds reports and ranges in disagreement; the train brakes, and until it stands it is not
+    counted as past its end.
+    """
+    plan = scenario.cbtc
+    braking_mps2 = plan.emergency_mps2 if plan else 1.0
+    delay_s = 3.0 * scenario.tick_s
+    passed = withdrawn = 0
+    excused = False
+    for tick in np.flatnonzero(on_line).tolist():
+        v = speed_mps[tick]
+        way_m = v * delay_s + 0.5 * v * v / braking_mps2
+        cut = tick > 0 and end_m[tick] < end_m[tick - 1] - 1.0
+        if cut and end_m[tick] < front_m[tick] + way_m:
+            withdrawn += not excused
+            excused = True
+        elif v == 0.0 or front_m[tick] <= end_m[tick] - way_m:
+            excused = False
+        passed += bool(v > 0.0 and front_m[tick] > end_m[tick] and not excused)
+    return passed, withdrawn
+
+
+def _held(end_m: FloatArray, accepted: FloatArray) -> FloatArray:
+    """End of authority, the last one where the protection has fallen silent."""
+    silent = np.isnan(accepted)
+    last = np.maximum.accumulate(np.where(silent, 0, np.arange(len(end_m))))
+    return np.where(silent, end_m[last], end_m)
+
+
+def _link(
+    scenario: Scenario,
+    on_line: NDArray[np.bool_],
+    atp: FloatArray,
+    given: FloatArray,
+    radio: FloatArray,
+    links: FloatArray,
+) -> dict[str, Any]:
+    """Frames both ways, and how old the authority on board was."""
+    age_s = atp[on_line, ATP_STATE.index["authority_age_s"]]
+    age_s = age_s[np.isfinite(age_s)]
+    accepted = _last(atp, ATP_STATE.index["accepted"]) + _last(given, AUTHORITY.index["accepted"])
+    lost = _last(atp, ATP_STATE.index["lost"]) + _last(given, AUTHORITY.index["lost"])
+    rejected = _last(atp, ATP_STATE.index["rejected"]) + _last(given, AUTHORITY.index["rejected"])
+    channel = radio[:, RADIO_LINK.index["channel"]]
+    changes = (channel[1:] != channel[:-1]) & (channel[:-1] > 0)
+    snr = links[on_line, CBTC_LINKS.index["snr_down"]]
+    snr = snr[snr > 0.0]
+    lost_s = np.count_nonzero(age_s > scenario.cbtc.timeout_s) if scenario.cbtc else 0
+    return {
+        "frames": int(accepted + lost),
+        "lost": int(lost),
+        "rejected": int(rejected),
+        "forged_accepted": forged_authorities(scenario.tick_s, atp, given),
+        "age_median_s": float(np.median(age_s)) if age_s.size else None,
+        "age_p95_s": float(np.quantile(age_s, 0.95)) if age_s.size else None,
+        "without_authority_s": float(lost_s * scenario.tick_s),
+        "handovers": int(np.count_nonzero(changes & on_line[1:])),
+        "snr_db": float(10.0 * np.log10(np.mean(snr))) if snr.size else None,
+    }
+
+
+def _passed_s(
+    scenario: Scenario, index: int, mine: FloatArray, on_line: NDArray[np.bool_]
+) -> list[float | None]:
+    """Time at which the front passed each of `PASSED_AT` [s], None if it did not."""
+    name = scenario.trains[index].route[0]
+    there = on_line & (mine[:, STATE.index["track_index"]] == list(scenario.tracks).index(name))
+    times_s = (np.flatnonzero(there) + 1) * scenario.tick_s
+    front_m = mine[there, STATE.index["chainage_m"]]
+    length_m = scenario.network.tracks[name].length_m
+    passed: list[float | None] = []
+    for fraction in PASSED_AT:
+        beyond = np.flatnonzero(front_m >= fraction * length_m)
+        if not beyond.size or beyond[0] == 0:  # it never came there, or was put there
+            passed.append(None)
+            continue
+        after = int(beyond[0])
+        pair = slice(after - 1, after + 1)
+        passed.append(float(np.interp(fraction * length_m, front_m[pair], times_s[pair])))
+    return passed
+
+
+def _last(table: FloatArray, column: int) -> float:
+    """The last figure of a running count."""
+    counts = table[:, column]
+    counts = counts[~np.isnan(counts)]
+    return float(counts[-1]) if counts.size else 0.0
+
+
+def _location(
+    on_line: NDArray[np.bool_], front_m: FloatArray, atp: FloatArray
+) -> dict[str, float | int | None]:
+    """Where the train believed to be, against the truth."""
+    error_m = np.abs(atp[:, ATP_STATE.index["front_m"]] - front_m)
+    half_m = atp[:, ATP_STATE.index["uncertainty_m"]]
+    known = on_line & np.isfinite(error_m) & np.isfinite(half_m)
+    if not known.any():
+        return {"located": 0.0, "location_rmse_m": None, "uncertainty_m": None, "mislocated": 0}
+    return {
+        "located": float(np.count_nonzero(known) / np.count_nonzero(on_line)),
+        "location_rmse_m": float(math.sqrt(np.mean(error_m[known] ** 2))),
+        "uncertainty_m": float(np.median(half_m[known])),
+        "mislocated": int(np.count_nonzero(error_m[known] > half_m[known])),
+    }

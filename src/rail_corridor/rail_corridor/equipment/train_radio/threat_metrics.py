@@ -1,0 +1,111 @@
+"""From a recording to figures: threats on the network, and whether any end believed them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rail_corridor.report.run_data import FloatArray, Recording
+from rail_corridor.scenario.model import Scenario
+from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, REPORTS, STRIKES
+from rail_msgs_py.train_radio.fixed_point import covering
+from rail_msgs_py.train_radio.train_report import PER_METRE, PER_METRE_COARSE, WIDEST_M
+
+#: Times on the wire are whole microseconds.
+_SAME_S = 2e-6
+#: What rounding on the wire may take off an authority [m].
+_ROUNDING_M = 0.011
+
+
+def threat_metrics(recording: Recording) -> dict[str, Any]:
+    """Section ``threats``: frames carried by the backbone, and how often each threat struck."""
+    table = recording.strikes.upto(recording.ticks)[:, 0]
+    table = table[~np.isnan(table[:, 0])]
+    last = table[-1] if len(table) else np.zeros(len(STRIKES.columns))
+    frames, *strikes = last.astype(int).tolist()
+    return {"frames": frames, "strikes": dict(zip(STRIKES.columns[1:], strikes, strict=True))}
+
+
+def forged_authorities(tick_s: float, atp: FloatArray, given: FloatArray) -> int:
+    """Authorities in force on board that the zone controller has not given to this train.
+
+    ``atp`` and ``given`` are its tables [tick, column]. A genuine one has the end that was given
+    at its time-stamp. Where that tick of the controller is not on record, as when it died, any
+    end that it ever gave will do.
+    """
+    end_m, age_s = (
+        atp[:, ATP_STATE.index["end_of_authority_m"]],
+        atp[:, ATP_STATE.index["authority_age_s"]],
+    )
+    held = np.flatnonzero(np.isfinite(end_m) & np.isfinite(age_s))
+    sealed_s = np.round(held * tick_s - age_s[held], 6)
+    given_m = given[:, AUTHORITY.index["end_of_authority_m"]]
+    silent = np.isnan(given[:, AUTHORITY.index["accepted"]])
+    ever_m = given_m[np.isfinite(given_m)]
+    forged = 0
+    for time_s, told_m in sorted(set(zip(sealed_s.tolist(), end_m[held].tolist(), strict=True))):
+        then = round(time_s / tick_s)
+        if not 0 <= then < len(given_m) or abs(time_s - then * tick_s) > _SAME_S:
+            forged += 1
+            continue
+        wanted_m = ever_m if silent[then] else given_m[then : then + 1]
+        forged += not np.any(np.abs(wanted_m - told_m) <= _ROUNDING_M)
+    return forged
+
+
+def report_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, int]:
+    """Location reports that the zone controller took from a train, and those not given by it.
+
+    A genuine one tells, to the last bit, where the train believed to be at its time-stamp, is of
+    this train on its track, comes after all that were taken before it, and is no older than the
+    safe channel allows. The speed is not compared: what the odometer said is not on record. A
+    report of a tick whose belief is not on record is not judged, unless the train was silent by
+    then.
+    """
+    believed = recording.atp.upto(recording.ticks)[:, index]
+    recorded = ~np.isnan(believed[:, ATP_STATE.index["accepted"]])
+    silent = 2 + max(np.flatnonzero(recorded).tolist(), default=-1)
+    train = scenario.trains[index]
+    own = {
+        "train": index + 1,
+        "segment": list(scenario.tracks).index(train.route[0]),
+        "direction": 1,
+        "integrity_confirmed": 1,
+    }
+    taken = forged = 0
+    newest = -1
+    oldest_s = max(1.0, 3.0 * scenario.tick_s) + _SAME_S
+    for tick, row in recording.reports.of(index, recording.ticks):
+        taken += 1
+        sealed_s = row[REPORTS.index["sealed_s"]]
+        then = round(sealed_s / scenario.tick_s)
+        timely = (
+            newest < then <= tick
+            and then < silent
+            and abs(sealed_s - then * scenario.tick_s) <= _SAME_S
+            and tick * scenario.tick_s - sealed_s <= oldest_s
+        )
+        newest = max(newest, then)
+        if not timely:
+            forged += 1
+        elif then < len(recorded) and recorded[then]:
+            named = all(row[REPORTS.index[name]] == value for name, value in own.items())
+            forged += not (named and _same_place(row, believed[then]))
+    return {"reports_taken": taken, "forged_reports": forged}
+
+
+def _same_place(report: FloatArray, believed: FloatArray) -> bool:
+    """Whether a report tells the place that a train believed in, as it is written on the wire."""
+    front_m, half_m = (
+        believed[ATP_STATE.index["front_m"]],
+        believed[ATP_STATE.index["uncertainty_m"]],
+    )
+    valid = bool(report[REPORTS.index["position_valid"]])
+    if np.isnan(front_m):
+        return not valid
+    at, half = covering(front_m, half_m, PER_METRE, PER_METRE_COARSE)
+    if half / PER_METRE_COARSE > WIDEST_M:
+        return not valid
+    told = report[REPORTS.index["offset_m"]], report[REPORTS.index["uncertainty_m"]]
+    return valid and told == (at / PER_METRE, half / PER_METRE_COARSE)

@@ -1,0 +1,1 @@
+"""Figures of the source documents and of runs."""

@@ -1,0 +1,168 @@
+"""``rail report FILE.mcap``: the report of a recorded run, computed anew from its messages.
+
+Load, measure, report: the messages go through the same intake and the same measures as those of
+a run under way. Only what no message tells is taken from the notes of the run: how many nodes
+and processes it had, whether it came to its end, and how long it took.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rclpy.serialization import deserialize_message
+from rich.console import Console
+
+from rail_corridor.errors import InputError
+from rail_corridor.recording.mcap_file import RecordedChannel, RecordedMessage, RecordingFile
+from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
+from rail_corridor.run.plan import Plan, make_plan
+from rail_corridor.scenario.model import Scenario
+from rail_corridor.scenario.scenario_files import scenario_from
+from rail_msgs_py.message_definition import type_name
+
+from .intake import Intake, Reader
+from .report import make_report, print_report, write_report
+
+REPORT = "report.json"
+
+
+def show_report(path: Path, json_path: Path | None, console: Console) -> int:
+    """Print the report of a recording, and write it; returns the exit code."""
+    with RecordingFile(path) as file:
+        report = report_of(file)
+    if file.cut_at is not None:
+        console.print(
+            f"{path} is cut short at byte {file.cut_at}: this is the report of what is there",
+            soft_wrap=True,
+            highlight=False,
+        )
+    print_report(report, console)
+    different = differences(report, _reported(file))
+    if different:
+        line = f"not what the run itself reported: {', '.join(different)}"
+        console.print(f"[yellow]{line}[/yellow]", soft_wrap=True, highlight=False)
+    if json_path is not None:
+        write_report(report, json_path)
+        console.print(f"report written to {json_path}")
+    return 0
+
+
+class RecordedRun(NamedTuple):
+    """A run as its recording tells it; ``ending`` is None if that was cut short."""
+
+    scenario: Scenario
+    plan: Plan
+    intake: Intake
+    beginning: Beginning
+    ending: Ending | None
+
+
+def report_of(file: RecordingFile) -> dict[str, Any]:
+    """Report of a recording; reads it to its end.
+
+    Raises
+    ------
+    InputError
+        If it is damaged, or not a recording of a corridor.
+    """
+    run = run_of(file)
+    ending, intake = run.ending, run.intake
+    wall_s = math.nan if ending is None or ending.wall_time_s is None else ending.wall_time_s
+    intake.first_tick_s, intake.last_tick_s = 0.0, wall_s
+    return make_report(
+        run.scenario,
+        run.plan,
+        intake,
+        nodes=run.beginning.nodes,
+        processes=run.beginning.processes,
+        interrupted=ending is None or not ending.complete,
+    )
+
+
+def run_of(file: RecordingFile) -> RecordedRun:
+    """What a recording tells of its run; reads it to its end, raises as `report_of`."""
+    name = str(file.path)
+    with tempfile.TemporaryDirectory(prefix="rail_corridor_") as directory:
+        try:
+            scenario = scenario_from(file.attachments, Path(directory))
+            beginning = Beginning.of(file.metadata.get(BEGIN, {}))
+            plan = make_plan(scenario, Path(directory))
+            intake = Intake(plan, tuple(scenario.tracks))
+            _feed(file, intake)
+            ending = Ending.of(file.metadata[END]) if END in file.metadata else None
+        except InputError as error:
+            raise error.located(name) from None
+    recording = intake.recording
+    if ending is None:
+        recording.end_at(max(recording.ticks - 1, 0))
+    elif not ending.complete:
+        recording.end_at(ending.ticks)
+    return RecordedRun(scenario, plan, intake, beginning, ending)
+
+
+def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any] | None) -> list[str]:
+    """Names of the figures in which two reports differ; none where there is but one report.
+
+    >>> differences({"ticks": 3, "trains": {"a": {"max_m": 0.5}}}, {"ticks": 3, "trains": {}})
+    ['trains']
+    >>> differences({"trains": {"a": {"max_m": 0.5}}}, {"trains": {"a": {"max_m": 0.6}}})
+    ['trains.a.max_m']
+    """
+    if theirs is None:
+        return []
+    found = []
+    for key in sorted({*ours, *theirs}):
+        one, other = ours.get(key), theirs.get(key)
+        if isinstance(one, Mapping) and isinstance(other, Mapping) and {*one} == {*other}:
+            found += [f"{key}.{name}" for name in differences(one, other)]
+        elif one != other:
+            found.append(key)
+    return found
+
+
+def _reported(file: RecordingFile) -> dict[str, Any] | None:
+    """The report that the run made itself, None if it did not come to that."""
+    for attachment in file.attachments:
+        if attachment.name == REPORT:
+            try:
+                found = json.loads(attachment.data)
+            except ValueError:
+                return None
+            return found if isinstance(found, dict) else None
+    return None
+
+
+def _feed(file: RecordingFile, intake: Intake) -> None:
+    """Give every message that the report reads to its reader."""
+    readers = {reader.name: reader for reader in intake.readers}
+
+    def wanted(channel: RecordedChannel) -> bool:
+        reader = readers.get(channel.topic)
+        if reader is None:
+            return False
+        kind = type_name(reader.topic.type)
+        if channel.type != kind:
+            raise InputError(f"must be of type {kind}", field=channel.topic, value=channel.type)
+        return True
+
+    for chunk in file.chunks(wanted):
+        for message in chunk:
+            _take(readers[message.channel.topic], message)
+
+
+def _take(reader: Reader, message: RecordedMessage) -> None:
+    try:
+        data = message.data
+        reader.take(data if reader.raw else deserialize_message(data, reader.topic.type))
+    except Exception as error:  # whatever nonsense makes of the readers
+        what = f"{type(error).__name__}: {error}"
+        raise InputError(
+            f"the message at {message.log_time_ns * 1e-9:g} s cannot be read: {what}",
+            field=message.channel.topic,
+            value=message.data[:16].hex(),
+        ) from None

@@ -1,0 +1,1 @@
+"""Running a scenario: from the plan to processes and their end."""

@@ -1,0 +1,361 @@
+"""Runs a corridor: starts its processes, watches them, ends them, makes the report."""
+
+from __future__ import annotations
+
+import gc
+import os
+import shutil
+import signal
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from rail_corridor.errors import InputError
+from rail_corridor.processes import ProcessGroup, remove_orphaned_segments
+from rail_corridor.recording.frames import Attachment
+from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
+from rail_corridor.report.report import make_report, print_report, report_text, write_report
+from rail_corridor.scenario.model import Scenario
+from rail_corridor.scenario.scenario_files import files_of
+
+from .bystander import FULL_NAME as BYSTANDER
+from .bystander import Bystander
+from .domain import sole_corridor
+from .host import make_context, make_nodes, node_class, run_nodes
+from .kills import Executioner, Kill, check_kills
+from .middleware import discover_on
+from .plan import REPORT, WORLD, Placement, Plan, check_external, make_plan
+
+if TYPE_CHECKING:
+    from rail_corridor.equipment.node_spec import NodeSpec
+    from rail_corridor.recording.run_recording import RunRecording
+
+#: More processes than this to a core cost more than they show.
+MOST_PROCESSES_PER_CORE = 8
+#: Wall time to read what is still under way when the world has finished.
+DRAIN_S = 20.0
+#: ... and where some of it will not come, as its sender has failed or the run was stopped.
+SETTLE_S = 0.3
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How to run a scenario, apart from what is in it."""
+
+    rate: float = 0.0
+    placement: Placement | None = None
+    only: Literal["wayside", "onboard"] | None = None
+    report: Path | None = None
+    timeout_s: float = 30.0
+    external: tuple[str, ...] = ()
+    kills: tuple[Kill, ...] = ()
+    record: Path | None = None
+    switches: bool = False
+
+    @property
+    def with_strangers(self) -> bool:
+        """Whether somebody else runs some of the nodes."""
+        return bool(self.external or self.only)
+
+
+def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
+    """Run a scenario to its end, or until interrupted.
+
+    Returns
+    -------
+    int
+        Exit code: 0, 1 if the world itself or the recorder failed, 128 + the number of the signal
+        that ended it.
+    """
+    if options.record is not None:
+        _check_recording(options.record, options.only)
+    discover_on("all" if options.only else "this")
+    directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
+    try:
+        strangers = (BYSTANDER,) if options.record and options.with_strangers else ()
+        plan = make_plan(
+            scenario,
+            directory,
+            rate=options.rate,
+            timeout_s=options.timeout_s,
+            external=options.external,
+            bystanders=(REPORT, *strangers),
+        )
+        check_external(plan, options.external)
+        with sole_corridor(options.only):
+            return _Run(scenario, options, plan, console).run()
+    finally:
+        shutil.rmtree(directory, ignore_errors=True)
+
+
+def _check_recording(path: Path, only: str | None) -> None:
+    """Raise InputError for a recording that cannot be made."""
+    if path.suffix != ".mcap":
+        reason = "the name of a recording ends in .mcap"
+    elif only == "onboard":
+        reason = "record where the world runs, with --only wayside"
+    else:
+        return
+    raise InputError(reason, field="--record", value=str(path))
+
+
+def default_placement(plan: Plan, cores: int | None = None) -> Placement:
+    """A process per site and train, unless they are too many for the cores: then one is faster."""
+    most = MOST_PROCESSES_PER_CORE * (cores or os.cpu_count() or 1)
+    return "site" if len({spec.site for spec in plan.nodes}) <= most else "one"
+
+
+class _Run:
+    """One run, from the first process to the report."""
+
+    def __init__(
+        self, scenario: Scenario, options: RunOptions, plan: Plan, console: Console
+    ) -> None:
+        self._scenario, self._options, self._plan = scenario, options, plan
+        self._console = console
+        placement = options.placement or default_placement(plan)
+        self._groups = plan.groups(placement, options.only, options.external)
+        # One process is this one: the report then hears every node without leaving it.
+        self._here = [spec for specs in self._groups.values() for spec in specs]
+        if placement != "one":
+            self._here.clear()
+        check_kills(options.kills, self._groups, WORLD, one=bool(self._here))
+        self._recording: RunRecording | None = None
+        self._recording_failed = False
+        self._signal = 0
+        self._world_failed = False
+        self._observer: Any = None
+        self._progress: Progress | None = None
+        self._bar: TaskID | None = None
+        self._stop: Any = None
+
+    def run(self) -> int:
+        for specs in self._groups.values():
+            for kind in {spec.kind for spec in specs}:
+                node_class(kind)
+        nodes = sum(len(specs) for specs in self._groups.values())
+        if self._options.record is not None:
+            self._recording = self._record(self._options.record, nodes)
+        plural = "process" if len(self._groups) == 1 else "processes"
+        self._console.print(
+            f"[bold]{self._plan.scenario}[/bold]: {nodes} nodes in {len(self._groups)} {plural}, "
+            f"{self._plan.ticks * self._plan.tick_s:.0f} s to simulate"
+        )
+        for name in self._options.external:
+            self._console.print(f"waiting for {name}, which somebody else runs")
+        # After the recorder, which would hold the other processes to life.
+        self._processes = ProcessGroup()
+        previous = {
+            number: signal.signal(number, self._on_signal)
+            for number in (signal.SIGINT, signal.SIGTERM)
+        }
+        try:
+            for name, specs in self._groups.items() if not self._here else ():
+                self._processes.start(name, lambda name=name, specs=specs: self._child(name, specs))
+            self._watch()
+        finally:
+            self._processes.stop()
+            remove_orphaned_segments(besides=os.getpid())  # ROS is shut down here by now
+            try:
+                report = self._report(nodes)
+            finally:
+                self._end_recording()
+            for number, handler in previous.items():
+                signal.signal(number, handler)
+        return self._finish(report)
+
+    def _child(self, name: str, specs: list[NodeSpec]) -> None:
+        """In a process of its own: run nodes, and tell the recorder what they publish."""
+        tap = self._recording.tap_of(name) if self._recording else None
+        run_nodes(specs, tap, switches=self._options.switches)
+
+    def _record(self, path: Path, nodes: int) -> RunRecording:
+        """Start the recorder, before any other process and before ROS."""
+        from rail_corridor.recording.run_recording import RunRecording
+
+        plan = self._plan
+        beginning = Beginning(plan.scenario, plan.seed, nodes, len(self._groups))
+        return RunRecording(
+            path,
+            () if self._here else self._groups,
+            files_of(self._scenario),
+            {BEGIN: beginning.values()},
+            strangers=self._options.with_strangers,
+        )
+
+    def _on_signal(self, number: int, frame: Any) -> None:
+        self._signal = number
+        if self._stop is not None and not self._stop.done():
+            self._stop.set_result(None)
+
+    def _watch(self) -> None:
+        """Observe the run until it ends. ROS is initialised here, after the forks."""
+        import rclpy
+        from rclpy.experimental.events_executor import EventsExecutor
+        from rclpy.signals import SignalHandlerOptions
+        from rclpy.task import Future
+
+        from rail_msgs_py.standalone import FOREVER_S
+
+        from .observer import Observer
+
+        tap = self._recording.start() if self._recording else None
+        context = make_context(tap)
+        rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+        self._stop = Future()
+        tracks = tuple(self._scenario.tracks)
+        self._observer = Observer(
+            self._plan,
+            tracks,
+            self._on_progress,
+            context=context,
+            record=self._options.only != "onboard",
+        )
+        here = make_nodes(self._here, context, switches=self._options.switches)
+        nodes = [self._observer, *here]
+        if tap is not None and self._options.with_strangers:
+            ours = {spec.name for specs in self._groups.values() for spec in specs}
+            others = [spec.name for spec in self._plan.nodes if spec.name not in ours]
+            from rail_corridor.recording.run_recording import SHARED
+
+            nodes.append(Bystander(others, tap.open, SHARED, context=context))
+        executor = EventsExecutor(context=context)
+        for node in nodes:
+            executor.add_node(node)
+        self._arrange_kills(executor, nodes)
+        with Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=None),
+            TextColumn("{task.completed:.1f} of {task.total:.0f} s  {task.fields[speed]}"),
+            TimeRemainingColumn(),
+            console=self._console,
+            transient=True,
+        ) as self._progress:
+            total_s = self._plan.ticks * self._plan.tick_s
+            self._bar = self._progress.add_task("connecting", total=total_s, speed="")
+            if not self._signal:
+                executor.spin_until_future_complete(self._stop, timeout_sec=FOREVER_S)
+            self._drain(executor)
+        executor.shutdown()
+        gc.unfreeze()
+        for node in nodes:
+            node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+    def _arrange_kills(self, executor: Any, nodes: list[Any]) -> None:
+        """Kill equipment in the tick that its time falls into."""
+        observer, kills = self._observer, self._options.kills
+        if not kills:
+            return
+        from rail_msgs_py.table import figures_from_cdr
+        from rail_msgs_py.topics.world import STATE
+
+        process = {spec.name: name for name, specs in self._groups.items() for spec in specs}
+        here = {node.get_fully_qualified_name(): node for node in nodes if node is not observer}
+
+        def kill(name: str) -> None:
+            if name not in here:
+                self._processes.kill(process[name])
+                return
+            # Not destroyed before the end: what is under way to it would find no handle.
+            executor.remove_node(here[name])
+            observer.announce_failure(name, "killed")
+
+        executioner = Executioner(kills, kill)
+        shape = len(self._scenario.trains), len(STATE.columns)
+        observer.stream_in(STATE, lambda raw: executioner.tick(figures_from_cdr(raw, *shape)[0]))
+
+    def _drain(self, executor: Any) -> None:
+        """Read what was sent before the end; of a run that was stopped, its last whole tick."""
+        from rclpy.task import Future
+
+        if self._options.only == "onboard":
+            return
+        observer = self._observer
+        stopped = bool(self._signal) or self._world_failed
+        ticks = observer.finished_ticks
+        if ticks is None:
+            ticks = max(observer.tick - 1, 0)
+            observer.recording.end_at(ticks)
+        limit_s = SETTLE_S if stopped or observer.failures else DRAIN_S
+        done = Future()
+
+        def poll() -> None:
+            waited_s = observer.steady_s() - started_s
+            if (observer.intake.complete(ticks) or waited_s > limit_s) and not done.done():
+                done.set_result(None)
+
+        started_s = observer.steady_s()
+        if not observer.intake.complete(ticks):
+            observer.every(0.01, poll)
+            executor.spin_until_future_complete(done, timeout_sec=limit_s + 1.0)
+
+    def _on_progress(self) -> None:
+        """Ten times a second: look after the processes and the bar."""
+        observer, stop = self._observer, self._stop
+        for child in self._processes.poll():
+            for spec in self._groups[child.name]:
+                observer.announce_failure(spec.name, f"process {child.ended}")
+                self._world_failed |= spec.name == WORLD
+        if self._recording is not None and not self._recording_failed:
+            self._tell_trouble(self._recording.trouble(), "; the run goes on")
+        if stop.done():
+            return
+        if observer.finished_ticks is not None or self._world_failed or self._signal:
+            stop.set_result(None)
+        if self._progress is None or self._bar is None or not observer.tick:
+            return
+        intake = observer.intake
+        sim_s = observer.tick * self._plan.tick_s
+        elapsed_s = intake.last_tick_s - intake.first_tick_s
+        speed = f"{sim_s / elapsed_s:.0f} x real time" if elapsed_s > 0.5 else ""
+        self._progress.update(self._bar, description="running", completed=sim_s, speed=speed)
+
+    def _tell_trouble(self, trouble: str | None, so: str = "") -> None:
+        if trouble is not None:
+            self._recording_failed = True
+            line = f"recording to {self._options.record} has failed: {trouble}{so}"
+            self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)
+
+    def _report(self, nodes: int) -> dict[str, Any] | None:
+        """What the run showed, None where the report is made on another host."""
+        if self._options.only == "onboard" or self._observer is None:
+            return None
+        report = make_report(
+            self._scenario,
+            self._plan,
+            self._observer.intake,
+            nodes=nodes,
+            processes=len(self._groups),
+            interrupted=bool(self._signal) or self._world_failed,
+        )
+        if self._recording is not None and not self._recording_failed:
+            ending = Ending(report["complete"], report["ticks"], report["wall_time_s"])
+            file = Attachment("report.json", "application/json", report_text(report).encode())
+            self._recording.tell([file], {END: ending.values()})
+        return report
+
+    def _end_recording(self) -> None:
+        if self._recording is None:
+            return
+        trouble = self._recording.finish()
+        if not self._recording_failed:
+            self._tell_trouble(trouble)
+
+    def _finish(self, report: dict[str, Any] | None) -> int:
+        if report is not None:
+            print_report(report, self._console)
+            if self._options.report is not None:
+                write_report(report, self._options.report)
+                self._console.print(f"report written to {self._options.report}")
+        if self._recording is not None and not self._recording_failed:
+            self._console.print(f"recorded to {self._options.record}")
+        if self._world_failed:
+            return 1
+        if self._signal:
+            return 128 + self._signal
+        return 1 if self._recording_failed else 0

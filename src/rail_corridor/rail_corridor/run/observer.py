@@ -1,0 +1,136 @@
+"""The report's ear: a node that reads truth and estimates from the running corridor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from std_msgs.msg import Header
+
+from rail_corridor.report.intake import Intake
+from rail_corridor.report.map_markers import train_markers
+from rail_corridor.report.run_data import Recording
+from rail_msgs_py.failures import failure
+from rail_msgs_py.node import CorridorNode
+from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
+from rail_msgs_py.topics.tick import FAILED, OBSERVED
+from rail_msgs_py.topics.world import STATE, TRAIN_MARKERS
+
+from .plan import REPORT, Plan
+
+NAME = REPORT.strip("/")
+
+
+class Observer(CorridorNode):
+    """Records a run; says when it has ended.
+
+    Parameters
+    ----------
+    plan : Plan
+    tracks : tuple of str
+        Names of the tracks in the order of the scenario.
+    on_progress : callable
+        Called about ten times a second of wall time.
+    record : bool
+        False where the report is made on another host.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        tracks: tuple[str, ...],
+        on_progress: Callable[[], None],
+        *,
+        context: Any = None,
+        record: bool = True,
+    ) -> None:
+        super().__init__(NAME, "/", context=context, services=False)
+        self._tick_ns = plan.world.tick_ns
+        self.intake = Intake(plan, tracks)
+        self._failed = self.publisher(FAILED)
+        if record:
+            self._network = plan.world.network()
+            self._first_tracks = tuple(train.route[0] for train in plan.world.trains)
+            self._markers = self.publisher(TRAIN_MARKERS)
+            self._observed = self.publisher(OBSERVED)
+        for reader in self.intake.readers:
+            if not reader.raw:
+                self.listen(reader.topic, reader.take, **reader.parts)
+            elif record:
+                take = self._noting(reader.take) if reader.topic is STATE else reader.take
+                self.stream_in(reader.topic, take, **reader.parts)
+        self.every(0.1, on_progress)
+        # The world begins when the report of the run is connected, not that of another host.
+        if record:
+            self.announce_when_connected()
+
+    @property
+    def recording(self) -> Recording:
+        """What has been read."""
+        return self.intake.recording
+
+    @property
+    def failures(self) -> list[dict[str, Any]]:
+        """Nodes that failed."""
+        return self.intake.failures
+
+    @property
+    def finished_ticks(self) -> int | None:
+        """Ticks of the whole run, None as long as it goes on."""
+        return self.intake.finished_ticks
+
+    @property
+    def tick(self) -> int:
+        """Ticks seen so far."""
+        return self.recording.ticks
+
+    @property
+    def complete(self) -> bool:
+        """Whether the last tick of a finished run has been read in full."""
+        ticks = self.finished_ticks
+        return ticks is not None and self.intake.complete(ticks)
+
+    def announce_failure(self, node: str, reason: str) -> None:
+        """Tell the corridor that a node has gone."""
+        stamp_ns = max(self.tick - 1, 0) * self._tick_ns
+        message = failure(node, reason, "the launcher", stamp_ns)
+        self.intake.take_failed(message)  # it may be the end of the run
+        self._failed.publish(message)
+
+    def _noting(self, take: Callable[[bytes], None]) -> Callable[[bytes], None]:
+        """Reader of the truth that notes the wall time, and tells the world how far it has read."""
+        intake, window = self.intake, OBSERVER_WINDOW_TICKS // 4
+
+        def take_state(raw: bytes) -> None:
+            now_s = self.steady_s()
+            if math.isnan(intake.first_tick_s):
+                intake.first_tick_s = now_s
+            intake.last_tick_s = now_s
+            take(raw)
+            tick = self.tick - 1
+            of_a_second = tick * self._tick_ns % NANOSECONDS < self._tick_ns
+            if of_a_second and self._markers.get_subscription_count():
+                self._publish_markers(tick - 1)
+            if tick % window == 0:
+                header = Header()
+                header.stamp.sec, header.stamp.nanosec = divmod(tick * self._tick_ns, 1_000_000_000)
+                self._observed.publish(header)
+
+        return take_state
+
+    def _publish_markers(self, tick: int) -> None:
+        """Trains of a tick in the map; everything about the one before the present is in."""
+        if tick < 0:
+            return
+        recording = self.intake.recording
+        records = [recording.state, recording.position]
+        if recording.localizer:
+            records.append(recording.located)
+        rows = [record.upto(tick + 1)[tick] for record in records]
+        stamp_ns = tick * self._tick_ns
+        markers = train_markers(
+            stamp_ns, recording.trains, self._network, *rows, first_tracks=self._first_tracks
+        )
+        self._markers.publish(markers)

@@ -1,0 +1,1 @@
+"""Scenarios: the model of the file, loading and checking it."""

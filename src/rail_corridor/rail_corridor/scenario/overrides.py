@@ -1,0 +1,154 @@
+"""What the command line changes in a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from rail_corridor.errors import InputError
+from rail_world.line.description import TrainDescription
+from rail_world.line.network import Network
+
+COMMAND_LINE: Final = "command line"
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """What the command line changes in a scenario; None leaves it as it is.
+
+    Parameters
+    ----------
+    seed : int, optional
+        Seed of every draw.
+    duration_s : float, optional
+        Simulated time [s].
+    track : str or Path, optional
+        TTOBench file that takes the place of the first track.
+    trains : int, optional
+        Number of trains: that many of a timetable, or the first ones of a list.
+    zone_length_m : float, optional
+        Automatic placing of stations with this zone length [m].
+    reference_spacing_m, reference_offset_m : float, optional
+        Reference stations so far apart and off the track [m].
+    reverse : bool
+        Trains run the other way, from the other end of their track.
+    """
+
+    seed: int | None = None
+    duration_s: float | None = None
+    track: str | Path | None = None
+    trains: int | None = None
+    zone_length_m: float | None = None
+    reference_spacing_m: float | None = None
+    reference_offset_m: float | None = None
+    reverse: bool = False
+
+
+_OPTIONS: Final[Mapping[str, str]] = {
+    "seed": "--seed",
+    "duration_s": "--duration",
+    "track": "--track",
+    "trains": "--trains",
+    "zone_length_m": "--zone-length",
+    "reference_spacing_m": "--spacing",
+    "reference_offset_m": "--offset",
+}
+
+
+def apply_overrides(data: dict[str, Any], overrides: Overrides) -> dict[str, str]:
+    """Change the data as asked; return which field came from which override."""
+    origins: dict[str, str] = {}
+    if overrides.seed is not None:
+        data["seed"] = overrides.seed
+        origins["seed"] = "seed"
+    if overrides.duration_s is not None:
+        data["duration_s"] = overrides.duration_s
+        origins["duration_s"] = "duration_s"
+    if overrides.track is not None:
+        tracks = data.get("tracks")
+        name = next(iter(tracks), "main") if isinstance(tracks, dict) else "main"
+        data["tracks"] = {
+            **(tracks if isinstance(tracks, dict) else {}),
+            name: {"ttobench": str(Path(overrides.track).absolute())},
+        }
+        origins[f"tracks.{name}"] = "track"
+    if overrides.zone_length_m is not None:
+        stations = data.get("stations")
+        kept = stations if isinstance(stations, dict) else {}
+        data["stations"] = {
+            **{key: value for key, value in kept.items() if key != "positions"},
+            "zone_length_m": overrides.zone_length_m,
+        }
+        origins["stations.zone_length_m"] = "zone_length_m"
+    for name, field in (("reference_spacing_m", "spacing_m"), ("reference_offset_m", "offset_m")):
+        value = getattr(overrides, name)
+        if value is not None:
+            plan = data.get("references")
+            data["references"] = {**(plan if isinstance(plan, dict) else {}), field: value}
+            origins[f"references.{field}"] = name
+    if overrides.trains is not None:
+        _apply_train_count(data, overrides.trains)
+        origins["timetable.count"] = "trains"
+    return origins
+
+
+def _apply_train_count(data: dict[str, Any], count: int) -> None:
+    listed = data.get("trains")
+    listed = listed if isinstance(listed, list) else []
+    timetable = data.get("timetable")
+    if not isinstance(timetable, dict):
+        if not 1 <= count <= len(listed):
+            raise InputError(
+                f"the scenario lists {len(listed)} trains and has no timetable to make more",
+                file=COMMAND_LINE,
+                field=_OPTIONS["trains"],
+                value=count,
+            )
+        data["trains"] = listed[:count]
+    elif 1 <= count <= len(listed):
+        data["trains"] = listed[:count]
+        data["timetable"] = None
+    else:
+        data["timetable"] = {**timetable, "count": count - len(listed)}
+
+
+def turned_round(
+    trains: Iterable[TrainDescription], network: Network
+) -> tuple[TrainDescription, ...]:
+    """Trains that run the other way, as far from the other end of their track.
+
+    Raises
+    ------
+    InputError
+        For a train that runs over more than one track, or turns back by itself.
+    """
+    found = []
+    for train in trains:
+        if len(train.route) > 1 or train.reverse_at:
+            raise InputError(
+                f"{train.name} runs over junctions or turns back",
+                file=COMMAND_LINE,
+                field="--reverse",
+                value=True,
+            )
+        length_m = network.tracks[train.route[0]].length_m
+        turned = {"direction": -train.direction, "start_m": length_m - train.start_m}
+        found.append(train.model_copy(update=turned))
+    return tuple(found)
+
+
+def blame_override(
+    error: InputError, overrides: Overrides, origins: Mapping[str, str]
+) -> InputError:
+    """Return the error as one of the command line, if the field it names came from there."""
+    for prefix, name in origins.items():
+        if not error.file and (error.field == prefix or error.field.startswith(f"{prefix}.")):
+            return InputError(
+                error.reason,
+                file=COMMAND_LINE,
+                field=_OPTIONS[name],
+                value=getattr(overrides, name),
+            )
+    return error

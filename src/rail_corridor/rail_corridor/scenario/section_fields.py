@@ -1,0 +1,24 @@
+"""Kinds of fields that sections of a scenario share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field
+
+from rail_world.line.description import Number
+
+
+def _not_a_bool(value: object) -> object:
+    if isinstance(value, bool):
+        raise ValueError("a whole number is wanted, not a truth value")
+    return value
+
+
+Whole = Annotated[int, BeforeValidator(_not_a_bool)]
+ChannelNumber = Annotated[Whole, Field(ge=1, le=99)]
+ChannelPair = tuple[ChannelNumber, ChannelNumber]
+Time = Annotated[Number, Field(ge=0.0, le=1e6)]
+Frequency = Annotated[Number, Field(ge=1.0, le=1e9)]
+Power = Annotated[Number, Field(ge=-150.0, le=60.0)]
+Gain = Annotated[Number, Field(ge=-20.0, le=40.0)]

@@ -1,0 +1,296 @@
+"""The sections of a scenario file: their fields, units, bounds and defaults.
+
+Tracks, junctions and trains are described in ``rail_world.line.description``. Each section checks
+what it can tell from itself; what concerns several sections is checked in ``scenario_checks``.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Annotated, Final, Literal
+
+from pydantic import Field, model_validator
+
+from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
+from rail_signals.ranging.signal import RangingSignal
+from rail_signals.track_code.profile import load_profile
+from rail_world.line.description import Chainage, Description, Name, Number
+
+from .section_fields import ChannelPair, Frequency, Gain, Power, Whole
+
+LONGEST_ZONE_M: Final = 2000.0
+SHORTEST_ZONE_M: Final = 20.0
+#: Profile whose fields the supervision of trains understands.
+TRACK_CODE: Final = "tones27"
+
+
+class StationPosition(Description):
+    """One station placed by hand: at a chainage, or where a branch clears its junction."""
+
+    name: Name = Field(description="name of the station")
+    track: Name | None = Field(default=None, description="track it stands at")
+    at_m: Chainage | None = Field(default=None, description="chainage it stands at [m]")
+    junction: Name | None = Field(
+        default=None, description="instead: branch whose fouling point it stands at"
+    )
+    zone: Name | None = Field(
+        default=None, description="name of its zone (on the main track at a junction)"
+    )
+    branch_zone: Name | None = Field(
+        default=None, description="at a junction: name of its zone on the branch"
+    )
+
+    @model_validator(mode="after")
+    def _one_place(self) -> StationPosition:
+        if self.junction is None:
+            for name in ("track", "at_m"):
+                if getattr(self, name) is None:
+                    raise ValueError(f"{name}: a station has track and at_m, or junction")
+            if self.branch_zone is not None:
+                raise ValueError("branch_zone: goes with junction only")
+        else:
+            for name in ("track", "at_m"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"{name}: does not go with junction")
+        return self
+
+
+class StationPlan(Description):
+    """Where the wayside ranging stations (WRS) stand, by rule or one by one."""
+
+    zone_length_m: Annotated[Number, Field(ge=SHORTEST_ZONE_M, le=LONGEST_ZONE_M)] | None = Field(
+        default=None, description="automatic placing: no zone is longer than this [m]"
+    )
+    positions: tuple[StationPosition, ...] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=1000,
+        description="instead of zone_length_m: every station",
+    )
+    mast_offset_m: Number = Field(
+        default=3.0, ge=0.5, le=20.0, description="mast to the right of the track [m]"
+    )
+    mast_height_m: Number = Field(
+        default=5.0, ge=0.0, le=50.0, description="station antenna above the train antenna [m]"
+    )
+    fouling_distance_m: Number = Field(
+        default=4.5,
+        ge=2.0,
+        le=20.0,
+        description="distance of branch and main track where the junction's station stands [m]",
+    )
+
+    @model_validator(mode="after")
+    def _one_rule(self) -> StationPlan:
+        if (self.zone_length_m is None) == (self.positions is None):
+            raise ValueError("zone_length_m: give either zone_length_m or positions")
+        return self
+
+
+class ChannelPlan(Description):
+    """Pairs [downlink, uplink] that zones use in turn (Jeong et al., Figs 7 and 8)."""
+
+    main: tuple[ChannelPair, ...] = Field(
+        default=((1, 2), (3, 4)),
+        min_length=1,
+        max_length=20,
+        description="pairs in turn along a main track",
+    )
+    branch: tuple[ChannelPair, ...] = Field(
+        default=((5, 6), (7, 8)),
+        min_length=1,
+        max_length=20,
+        description="pairs in turn along a branch",
+    )
+    first_carrier_hz: Number = Field(
+        default=2.4e9, ge=1e7, le=1e11, description="carrier of channel 1 [Hz]"
+    )
+    spacing_hz: Frequency = Field(default=5e6, description="distance of two carriers [Hz]")
+
+    @model_validator(mode="after")
+    def _each_once(self) -> ChannelPlan:
+        used: set[int] = set()
+        for name, pairs in (("main", self.main), ("branch", self.branch)):
+            for index, pair in enumerate(pairs):
+                for channel in pair:
+                    if channel in used:
+                        raise ValueError(f"{name}.{index}: channel {channel} is used twice")
+                    used.add(channel)
+        return self
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Every channel of the plan, sorted."""
+        return tuple(sorted(c for pair in (*self.main, *self.branch) for c in pair))
+
+    @property
+    def carriers_hz(self) -> dict[int, float]:
+        """Carrier frequency [Hz] of every channel of the plan."""
+        return {c: self.first_carrier_hz + (c - 1) * self.spacing_hz for c in self.numbers}
+
+
+class RangingPlan(Description):
+    """The ranging signal and how its phase is compared."""
+
+    tone_hz: Frequency = Field(default=375e3, description="ranging tone [Hz]")
+    deviation_hz: Frequency = Field(default=375e3, description="peak FM deviation [Hz]")
+    low_tone_hz: Frequency | None = Field(
+        default=None, description="two_tone: tone that resolves the cycle of the other [Hz]"
+    )
+    low_deviation_hz: Frequency | None = Field(
+        default=None, description="two_tone: its peak FM deviation [Hz]; null = low_tone_hz"
+    )
+    sample_rate_hz: Frequency = Field(default=4e6, description="complex sample rate [Hz]")
+    samples: Whole = Field(
+        default=960, ge=8, le=32_768, description="samples of a burst: whole periods of the tones"
+    )
+    comparator: Literal["quadrature", "and", "two_tone"] = Field(
+        default="quadrature",
+        description="and: 0...180 degrees, as in the paper; quadrature: 0...360 degrees",
+    )
+
+    @model_validator(mode="after")
+    def _makes_a_signal(self) -> RangingPlan:
+        if (self.comparator == "two_tone") != (self.low_tone_hz is not None):
+            raise ValueError("low_tone_hz: goes with comparator two_tone, which needs it")
+        if self.low_deviation_hz is not None and self.low_tone_hz is None:
+            raise ValueError("low_deviation_hz: goes with comparator two_tone only")
+        if self.low_tone_hz is not None and self.low_tone_hz >= self.tone_hz:
+            raise ValueError(f"low_tone_hz: must be below tone_hz, {self.tone_hz:g} Hz")
+        try:
+            _ = self.signal
+        except ValueError as error:
+            field, _, reason = str(error).partition(" ")
+            names = {"tones_hz": "tone_hz", "deviations_hz": "deviation_hz"}
+            raise ValueError(f"{names.get(field, field)}: {reason}") from None
+        return self
+
+    @cached_property
+    def signal(self) -> RangingSignal:
+        """The signal that stations send."""
+        tones, deviations = [self.tone_hz], [self.deviation_hz]
+        if self.low_tone_hz is not None:
+            tones.append(self.low_tone_hz)
+            deviations.append(self.low_deviation_hz or self.low_tone_hz)
+        return RangingSignal(tuple(tones), tuple(deviations), self.sample_rate_hz, self.samples)
+
+    @property
+    def unambiguous_range_m(self) -> float:
+        """Longest range that the comparator tells from a shorter one [m] (Jeong et al., eq. 13).
+
+        A quarter of the wavelength for the AND comparator, half of it for the others; with two
+        tones the lower one counts.
+        """
+        tone_hz = self.low_tone_hz or self.tone_hz
+        return SPEED_OF_LIGHT_M_PER_S / ((4.0 if self.comparator == "and" else 2.0) * tone_hz)
+
+
+class RadioPlan(Description):
+    """Powers, antennas, noise and propagation."""
+
+    wrs_power_dbm: Power = Field(default=-10.0, description="transmit power of a station [dBm]")
+    vrs_power_dbm: Power = Field(default=-10.0, description="transmit power of a train [dBm]")
+    noise_figure_db: Number = Field(default=8.0, ge=0.0, le=30.0, description="receivers [dB]")
+    path_loss_exponent: Number = Field(
+        default=2.0, ge=1.5, le=6.0, description="2 = free space; counts from 1 m"
+    )
+    reach_zones: Number = Field(
+        default=2.0,
+        ge=1.0,
+        le=10.0,
+        description="nothing is heard beyond this many zone lengths (Jeong et al., 2.5: two)",
+    )
+    wrs_gain_dbi: Gain = Field(default=12.0, description="station antenna on its axis [dBi]")
+    wrs_beamwidth_deg: Number = Field(
+        default=60.0, ge=5.0, le=180.0, description="station antenna, between -3 dB points [deg]"
+    )
+    vrs_gain_dbi: Gain = Field(default=6.0, description="train antenna on its axis [dBi]")
+    vrs_beamwidth_deg: Number = Field(
+        default=60.0, ge=5.0, le=180.0, description="train antenna, between -3 dB points [deg]"
+    )
+    front_to_back_db: Number = Field(
+        default=30.0, ge=0.0, le=60.0, description="antennas, axis to back [dB]"
+    )
+    oscillator_ppm: Number = Field(
+        default=0.1, ge=0.0, le=1.0, description="standard deviation of each oscillator [ppm]"
+    )
+
+
+class TrackCircuitPlan(Description):
+    """Track circuits that send codes, and what trains make of them.
+
+    With this section trains run on what they understand from the rails.
+    """
+
+    length_m: Number = Field(
+        default=500.0, ge=50.0, le=3000.0, description="no circuit is longer than this [m]"
+    )
+    carriers_hz: tuple[Frequency, ...] = Field(
+        default=(1700.0, 2300.0),
+        min_length=2,
+        max_length=4,
+        description="carriers in turn along a track [Hz]",
+    )
+    sample_rate_hz: Frequency = Field(
+        default=16_000.0, description="sample rate in the rails; a multiple of 128 Hz"
+    )
+    braking_mps2: Number = Field(
+        default=0.5, ge=0.1, le=2.0, description="braking that the codes count on [m/s^2]"
+    )
+    cab_signals: bool = Field(
+        default=True, description="drivers keep to the permitted speed before the brake makes them"
+    )
+    attenuation_db_per_km: Number = Field(
+        default=6.0, ge=0.0, le=100.0, description="of the rails [dB/km]"
+    )
+    snr_db: Number = Field(
+        default=40.0,
+        ge=-20.0,
+        le=100.0,
+        description="level at the transmitter over white noise in 300 Hz [dB]",
+    )
+    joint_db: Number = Field(
+        default=30.0, ge=0.0, le=120.0, description="crosstalk past a joint, below the signal [dB]"
+    )
+    harmonics: tuple[tuple[Whole, Number], ...] = Field(
+        default=((31, -30.0), (33, -33.0), (35, -34.0), (37, -36.0), (47, -40.0)),
+        max_length=100,
+        description="traction current: [harmonic of 50 Hz, level against the transmitter in dB]",
+    )
+    impulses_per_s: Number = Field(
+        default=0.2, ge=0.0, le=1000.0, description="impulses of noise, of the transmitter's level"
+    )
+    odometer_error: Number = Field(
+        default=0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' error"
+    )
+
+    @model_validator(mode="after")
+    def _makes_a_signal(self) -> TrackCircuitPlan:
+        if self.sample_rate_hz % 128.0:
+            raise ValueError("sample_rate_hz: must be a multiple of 128 Hz")
+        if 2.0 * (max(self.carriers_hz) + 150.0) > self.sample_rate_hz:
+            raise ValueError(
+                "sample_rate_hz: must be twice the highest carrier and 150 Hz, or more"
+            )
+        known = load_profile(TRACK_CODE).carriers_hz
+        for index, carrier_hz in enumerate(self.carriers_hz):
+            if carrier_hz not in known:
+                raise ValueError(f"carriers_hz.{index}: {TRACK_CODE} has {known}")
+            if carrier_hz == self.carriers_hz[index - 1]:
+                raise ValueError(f"carriers_hz.{index}: neighbours need different carriers")
+        return self
+
+
+class TransponderPlan(Description):
+    """The delay of the transponders on board, and how well the bench knows it."""
+
+    delay_s: Number = Field(default=1e-6, ge=0.0, le=1e-4, description="nominal delay [s]")
+    spread_s: Number = Field(
+        default=5e-9,
+        ge=0.0,
+        le=1e-6,
+        description="standard deviation of the delay from one unit to the next [s]",
+    )
+    bench_bursts: Whole = Field(
+        default=400, ge=1, le=100_000, description="bursts of the calibration on the bench"
+    )

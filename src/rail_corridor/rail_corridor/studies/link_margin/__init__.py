@@ -1,0 +1,1 @@
+"""Headway against the margin of the train radio."""

@@ -1,0 +1,1 @@
+"""Reflectograms measured in the workshop."""

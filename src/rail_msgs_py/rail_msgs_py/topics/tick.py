@@ -1,0 +1,94 @@
+"""The tick itself: its start, its end, who is ready and who has failed."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header, String
+
+from .qos import LATCHED, STREAM
+from .topic import Topic
+
+CLOCK: Final = Topic(
+    "/clock",
+    Clock,
+    STREAM,
+    None,
+    "world",
+    "wrs, zone_controller, track_code_transmitter, cbtc_base_station, cbtc_radio, backbone, "
+    "reference_station, bus_medium, bus_terminal, train_bus_monitor",
+    "Start of a tick.",
+)
+DONE: Final = Topic(
+    "{node}/done",
+    Header,
+    STREAM,
+    None,
+    "radio_medium, rail_medium, cbtc_medium, backbone, reference_medium, bus_medium, "
+    "zone_controller",
+    "world",
+    "The node has finished the tick of this stamp.",
+)
+FINISHED: Final = Topic(
+    "/world/finished",
+    Header,
+    LATCHED,
+    None,
+    "world",
+    "the report",
+    "The run has reached its end.",
+)
+OBSERVED: Final = Topic(
+    "/report/observed",
+    Header,
+    LATCHED,
+    None,
+    "the report",
+    "world",
+    "The report has read everything up to this stamp; the world does not run far ahead of it.",
+)
+READY: Final = Topic(
+    "/ready",
+    String,
+    LATCHED,
+    None,
+    "every node",
+    "world",
+    "Name of a node whose topics are all connected.",
+)
+FAILED: Final = Topic(
+    "/failed",
+    DiagnosticStatus,
+    LATCHED,
+    None,
+    "every node that waits for others, the report for the launcher: world, radio_medium, "
+    "rail_medium, cbtc_medium, backbone, zone_controller, track_code_transmitter, "
+    "cbtc_base_station, code_supervision, cbtc_radio, atp, reference_medium, localizer, "
+    "bus_medium, bus_terminal, train_bus_monitor",
+    "world, radio_medium, rail_medium, cbtc_medium, backbone, zone_controller, "
+    "track_code_transmitter, cbtc_base_station, code_supervision, cbtc_radio, atp, "
+    "reference_medium, localizer, bus_medium, bus_terminal, train_bus_monitor, the report",
+    "A node that is not waited for any longer, and why.",
+)
+DIAGNOSTICS: Final = Topic(
+    "/diagnostics",
+    DiagnosticArray,
+    LATCHED,
+    None,
+    "every node",
+    "people, the report",
+    "Health, published when it changes (REP 107).",
+)
+
+#: In the order of the documentation.
+TOPICS: Final[tuple[Topic, ...]] = (
+    CLOCK,
+    DONE,
+    FINISHED,
+    OBSERVED,
+    READY,
+    FAILED,
+    DIAGNOSTICS,
+)

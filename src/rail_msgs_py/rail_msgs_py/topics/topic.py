@@ -1,0 +1,71 @@
+"""One kind of topic of the corridor."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from rclpy.qos import QoSProfile
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One kind of topic.
+
+    Parameters
+    ----------
+    pattern : str
+        Absolute name with ``{placeholders}`` in names of their own level.
+    type : message class
+    qos : QoSProfile
+    view : class with ``from_msg``, or None
+        How ``rail echo`` decodes it.
+    sender, readers, text : str
+        For the documentation.
+    columns : tuple of str
+        Of a table: names of its columns, each ending in its unit.
+    """
+
+    pattern: str
+    type: Any
+    qos: QoSProfile
+    view: Any
+    sender: str
+    readers: str
+    text: str
+    columns: tuple[str, ...] = ()
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Place of each column of the table.
+
+        >>> from rail_msgs_py.topics.track_code import OCCUPANCY
+        >>> OCCUPANCY.index["level_db"]
+        1
+        """
+        return {name: place for place, name in enumerate(self.columns)}
+
+    def name(self, **parts: object) -> str:
+        """Absolute name with the placeholders filled in.
+
+        >>> from rail_msgs_py.topics.ranging import RANGE
+        >>> RANGE.name(site="wrs1", zone="zone1")
+        '/wayside/wrs1/zone1/range'
+        """
+        return self.pattern.format(**parts)
+
+    def owner(self, **parts: object) -> str:
+        """Full name of the node that sends it, where the topic is named below its node.
+
+        >>> from rail_msgs_py.topics.track_code import OCCUPANCY
+        >>> OCCUPANCY.owner(circuit="tc1")
+        '/wayside/tc1/track_code'
+        """
+        return self.name(**parts).rpartition("/")[0]
+
+    def matches(self, name: str) -> bool:
+        """Whether ``name`` is of this kind."""
+        expression = re.sub(r"\\\{\w+\\\}", r"[^/]+", re.escape(self.pattern))
+        return re.fullmatch(expression, name) is not None

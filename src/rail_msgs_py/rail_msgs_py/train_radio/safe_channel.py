@@ -1,0 +1,281 @@
+"""One end of a safe channel over open radio (EN 50159:2010, category 3).
+
+================ ===================================================================
+threat           defence
+================ ===================================================================
+repetition       sequence number, always above the newest accepted one
+deletion         gap in the sequence numbers is counted; `silence_s` for the time-out
+insertion        safety code
+resequencing     sequence number
+corruption       safety code
+delay            time-stamp, with the clock skew counted against the frame
+masquerade       source and destination, a key for each direction of each pair and
+                 each session, kinds that this end takes; safety code
+restart of an    a session key made from a random nonce of either end: what was
+end              recorded before has another key
+================ ===================================================================
+
+**Sessions.** Each end offers a nonce that it draws anew for every session. While there is no
+session, `seal` gives greetings: my offer, and an echo of the peer's offer (zero if none is known).
+A greeting is never data. A session stands as soon as the peer has proved that it knows my present
+offer, by a greeting that echoes it or by data under the key of both offers; so the proof is as
+fresh as the offer, and whatever was recorded before it was drawn is of no use. A greeting from an
+end that was started anew is answered beside the running session, which ends only when the new one
+is proved: a recorded greeting cannot cut a link. When nothing is accepted for `session_timeout_s`
+the session is given up and offered again. (EuroRadio, UNISIG SUBSET-037, does the same with random
+numbers A and B, in three messages of their own.)
+
+Time is what the caller says it is; randomness comes from a function passed in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from rail_msgs_py.stamps import NANOSECONDS, seconds_to_ns
+
+from .fixed_point import check_identity, check_number
+from .safe_frame import (
+    FRAME_BYTES,
+    LAST_SEQUENCE,
+    LAST_TIME_NS,
+    NONCE_BYTES,
+    PAYLOAD_BYTES,
+    VERSION,
+    DirectionKeys,
+    Header,
+    Kind,
+    SafetyCode,
+    SessionKey,
+    payload_of,
+    read_header,
+)
+from .safe_result import Accepted, Greeted, Opened, Reason, Rejected
+
+_NO_NONCE: Final = bytes(NONCE_BYTES)
+_GREETING: Final = int(Kind.GREETING)
+
+
+@dataclass(slots=True)
+class _Session:
+    own_nonce: bytes
+    peer_nonce: bytes
+    transmit: SessionKey
+    receive: SessionKey
+    sent: int = 0
+    newest: int = 0
+
+
+class SafeChannel:
+    """One end of the channel between two ends; what it remembers is of fixed size.
+
+    Parameters
+    ----------
+    secret : bytes
+        Of the scenario, 16 bytes at least, the same at both ends.
+    own, peer : int
+        Identities, 0 to 65535, different.
+    accepts : kinds
+        What this end takes as data.
+    draw : function of a count
+        Gives so many random bytes: ``numpy.random.Generator.bytes`` in a simulation; in earnest
+        it would have to be ``secrets.token_bytes``.
+    max_age_s : float
+        Age above which a frame is rejected.
+    clock_skew_s : float
+        Most that the clocks of the two ends differ.
+    session_timeout_s : float
+        Silence after which a session is given up.
+    """
+
+    def __init__(
+        self,
+        secret: bytes,
+        own: int,
+        peer: int,
+        accepts: Iterable[Kind],
+        draw: Callable[[int], bytes],
+        *,
+        max_age_s: float = 1.0,
+        clock_skew_s: float = 0.0,
+        session_timeout_s: float = 5.0,
+    ) -> None:
+        check_identity("own", own)
+        check_identity("peer", peer)
+        if own == peer:
+            raise ValueError(f"own and peer must differ, got {own!r} for both")
+        check_number("max_age_s", max_age_s, 1e-3, 1e6)
+        check_number("clock_skew_s", clock_skew_s, 0.0, max_age_s)
+        check_number("session_timeout_s", session_timeout_s, max_age_s, 1e6)
+        self.own, self.peer = own, peer
+        self._accepts = {int(kind): kind for kind in accepts if kind is not Kind.GREETING}
+        self._draw = draw
+        self._transmit = DirectionKeys(secret, own, peer)
+        self._receive = DirectionKeys(secret, peer, own)
+        self._max_age_ns = seconds_to_ns(max_age_s)
+        self._skew_ns = seconds_to_ns(clock_skew_s)
+        self._timeout_ns = seconds_to_ns(session_timeout_s)
+        self._offer = draw(NONCE_BYTES)
+        self._session: _Session | None = None
+        self._candidate: _Session | None = None
+        self._answer_owed = self._greeted_last = False
+        self._greeting_ns = -1
+        self._heard_ns = 0
+        self._newest_ns: int | None = None
+
+    @property
+    def established(self) -> bool:
+        """Whether there is a session."""
+        return self._session is not None
+
+    def silence_s(self, time_ns: int) -> float:
+        """Age of the newest accepted data [s], infinite if there is none since the start."""
+        if self._newest_ns is None:
+            return math.inf
+        return (time_ns - self._newest_ns + self._skew_ns) / NANOSECONDS
+
+    def seal(self, kind: Kind, payload: bytes, time_ns: int) -> bytes:
+        """Frame of 64 bytes to send now.
+
+        It is a greeting, without the payload, while there is no session, and once when the peer
+        asks for a new one: telegrams are periodic, the next carries fresher content anyway.
+
+        Raises
+        ------
+        ValueError
+            If the kind is that of greetings, the payload too long or the time out of range.
+        """
+        if kind is Kind.GREETING:
+            raise ValueError("kind must be one of data, got GREETING")
+        if len(payload) > PAYLOAD_BYTES:
+            raise ValueError(f"payload must have at most {PAYLOAD_BYTES} bytes, got {len(payload)}")
+        if not 0 <= time_ns <= LAST_TIME_NS:
+            raise ValueError(f"time_ns must be from 0 to {LAST_TIME_NS}, got {time_ns!r}")
+        session = self._session
+        if session is not None and (
+            time_ns - self._heard_ns > self._timeout_ns or session.sent >= LAST_SEQUENCE
+        ):
+            session = self._session = None
+        # Every other frame at most is an answer, so that recorded greetings cannot stop the data.
+        if session is None or (self._answer_owed and not self._greeted_last):
+            return self._greeting(time_ns)
+        self._greeted_last = False
+        session.sent += 1
+        key = session.transmit
+        header = Header(
+            VERSION,
+            kind,
+            len(payload),
+            self.own,
+            self.peer,
+            session.sent,
+            time_ns,
+            session.newest,
+            key.mark,
+        )
+        return key.code.seal(header, payload)
+
+    def _greeting(self, time_ns: int) -> bytes:
+        self._answer_owed, self._greeted_last = False, True
+        echo = self._candidate.peer_nonce if self._candidate else _NO_NONCE
+        header = Header(
+            VERSION, Kind.GREETING, 2 * NONCE_BYTES, self.own, self.peer, 0, time_ns, 0, 0
+        )
+        return self._transmit.greeting.seal(header, self._offer + echo)
+
+    def open(self, frame: bytes, time_ns: int) -> Opened:
+        """What to make of bytes that arrived now; it never raises, whatever they are."""
+        if len(frame) != FRAME_BYTES:
+            return Rejected(Reason.MALFORMED)
+        header = read_header(frame)
+        if header.version != VERSION or header.length > PAYLOAD_BYTES:
+            return Rejected(Reason.MALFORMED)
+        greeting = header.kind == _GREETING
+        if not greeting and header.kind not in self._accepts:
+            return Rejected(Reason.UNEXPECTED_KIND)
+        if header.source != self.peer or header.destination != self.own:
+            return Rejected(Reason.WRONG_ADDRESS)
+        if greeting:
+            if not self._genuine(self._receive.greeting, frame):
+                return Rejected(Reason.SAFETY_CODE)
+            reason = self._untimely(header, time_ns) or _disorder(header.time_ns, self._greeting_ns)
+            return Rejected(reason) if reason else self._greet(header, payload_of(frame), time_ns)
+        session = self._session_of(header.mark)
+        if session is None:
+            return Rejected(Reason.UNKNOWN_SESSION)
+        if not self._genuine(session.receive.code, frame):
+            return Rejected(Reason.SAFETY_CODE)
+        reason = self._untimely(header, time_ns) or self._misplaced(header, session)
+        if reason:
+            return Rejected(reason)
+        return self._accept(header, payload_of(frame, header.length), session, time_ns)
+
+    def _genuine(self, code: SafetyCode, frame: bytes) -> bool:
+        return code.matches(frame)
+
+    def _session_of(self, mark: int) -> _Session | None:
+        for session in (self._session, self._candidate):
+            if session is not None and session.receive.mark == mark:
+                return session
+        return None
+
+    def _untimely(self, header: Header, time_ns: int) -> Reason | None:
+        age_ns = time_ns - header.time_ns
+        if age_ns < -self._skew_ns:
+            return Reason.FROM_THE_FUTURE
+        # The peer's clock may be fast by the skew: the frame is older than it looks.
+        return Reason.TOO_OLD if age_ns + self._skew_ns > self._max_age_ns else None
+
+    def _misplaced(self, header: Header, session: _Session) -> Reason | None:
+        return _disorder(header.sequence, session.newest)
+
+    def _accept(self, header: Header, payload: bytes, session: _Session, time_ns: int) -> Accepted:
+        if session is not self._session:
+            self._establish(session)
+        lost = header.sequence - session.newest - 1
+        session.newest = header.sequence
+        self._heard_ns, self._newest_ns = time_ns, header.time_ns
+        age_s = (time_ns - header.time_ns + self._skew_ns) / NANOSECONDS
+        kind = self._accepts[header.kind]
+        return Accepted(kind, payload, age_s, header.sequence, lost, header.feedback)
+
+    def _greet(self, header: Header, payload: bytes, time_ns: int) -> Greeted:
+        self._greeting_ns = header.time_ns
+        nonce, echo = payload[:NONCE_BYTES], payload[NONCE_BYTES:]
+        proved = echo == self._offer
+        session = self._session
+        if (
+            not proved
+            and session is not None
+            and nonce == session.peer_nonce
+            and echo in (_NO_NONCE, session.own_nonce)
+        ):
+            return Greeted(False)  # of the running session, sent before the peer knew it
+        candidate = self._candidate
+        if candidate is None or candidate.peer_nonce != nonce:
+            candidate = self._candidate = _Session(
+                self._offer,
+                nonce,
+                self._transmit.session(self._offer, nonce),
+                self._receive.session(nonce, self._offer),
+            )
+        if proved:
+            self._heard_ns = time_ns
+            self._establish(candidate)
+        else:
+            self._answer_owed = True
+        return Greeted(proved)
+
+    def _establish(self, session: _Session) -> None:
+        self._session, self._candidate = session, None
+        self._offer = self._draw(NONCE_BYTES)
+        self._answer_owed = False
+
+
+def _disorder(number: int, newest: int) -> Reason | None:
+    if number > newest:
+        return None
+    return Reason.REPEATED if number == newest else Reason.OUT_OF_ORDER

@@ -1,0 +1,100 @@
+"""The two ends of the safe channel between the zone controller and a train."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from .safe_channel import SafeChannel
+from .safe_frame import Kind
+from .safe_result import Accepted, Reason, Rejected
+
+CONTROLLER_IDENTITY: Final = 0xF000
+"""Of the zone controller; trains have their numbers."""
+# Streams of the seed that nonces are drawn from.
+_TRAIN_NONCES, _CONTROLLER_NONCES = 5, 6
+
+
+def controller_end(secret: str, seed: int, train: int, tick_s: float) -> SafeChannel:
+    """The zone controller's end: takes location reports of a train.
+
+    Parameters
+    ----------
+    secret : str
+        Hexadecimal digits.
+    seed : int
+        Of the nonces.
+    train : int
+        Number of the train.
+    tick_s : float
+        Time of a tick [s]: frames may be three of them old, or a second.
+
+    Raises
+    ------
+    ValueError
+        If the secret is no secret.
+    """
+    ends = (CONTROLLER_IDENTITY, train)
+    return _end(secret, seed, _CONTROLLER_NONCES, train, ends, Kind.LOCATION_REPORT, tick_s)
+
+
+def train_end(secret: str, seed: int, train: int, tick_s: float) -> SafeChannel:
+    """The train's end: takes movement authorities. Parameters as of `controller_end`."""
+    ends = (train, CONTROLLER_IDENTITY)
+    return _end(secret, seed, _TRAIN_NONCES, train, ends, Kind.MOVEMENT_AUTHORITY, tick_s)
+
+
+def _end(
+    secret: str,
+    seed: int,
+    stream: int,
+    train: int,
+    ends: tuple[int, int],
+    accepts: Kind,
+    tick_s: float,
+) -> SafeChannel:
+    bits = np.random.Philox(np.random.SeedSequence([seed, stream, train]))
+    draw = np.random.Generator(bits).bytes
+    max_age_s = max(1.0, 3.0 * tick_s)
+    return SafeChannel(bytes.fromhex(secret), *ends, (accepts,), draw, max_age_s=max_age_s)
+
+
+class CountedChannel:
+    """A safe channel that counts what it makes of frames.
+
+    Parameters
+    ----------
+    channel : SafeChannel
+
+    Attributes
+    ----------
+    accepted, lost, rejected : int
+        Frames taken as data, missing between them, and refused. One that came through two base
+        stations is no attack and not counted.
+    """
+
+    def __init__(self, channel: SafeChannel) -> None:
+        self.channel = channel
+        self.accepted = self.lost = self.rejected = 0
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Accepted, lost, rejected."""
+        return self.accepted, self.lost, self.rejected
+
+    def open(self, frame: bytes, time_ns: int) -> tuple[bool, Accepted | None]:
+        """Whether a frame is genuine, and its data if it carries any."""
+        opened = self.channel.open(frame, time_ns)
+        if isinstance(opened, Rejected):
+            self.rejected += opened.reason is not Reason.REPEATED
+            return False, None
+        if not isinstance(opened, Accepted):
+            return True, None
+        self.accepted += 1
+        self.lost += opened.lost
+        return True, opened
+
+    def refuse(self) -> None:
+        """Count data that are genuine and yet make no sense."""
+        self.rejected += 1

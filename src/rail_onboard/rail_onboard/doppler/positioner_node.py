@@ -1,0 +1,173 @@
+"""Positions of a train from the Doppler shifts of reference stations.
+
+Topics in: ``rx``. Topics out: ``fix``, ``position``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
+from rail_msgs_py.node import Equipment
+from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.position import Position, PositionWriter
+from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.standalone import run_node
+from rail_msgs_py.table import TableWriter
+from rail_msgs_py.topics.doppler import DOPPLER_FIX, DOPPLER_POSITION, REFERENCE_RX
+from rail_msgs_py.waveform import Waveform, silent_stamp_ns
+from rail_signals.doppler.receiver import ToneReceiver
+from rail_signals.doppler.solver import Answer, DopplerSolver, Reason
+from rail_signals.doppler.surveyed_line import SurveyedLine
+
+from .positioner import DopplerPositioner, Tracking
+
+
+@dataclass(frozen=True)
+class DopplerPositionerParameters(ReferenceToneParameters):
+    """Parameters of a positioner; arrays over points of the line, or over stations."""
+
+    track: str = parameter("main", "track it runs on, frame of its positions")
+    direction: int = parameter(
+        0, "1 or -1: towards greater or smaller chainages; 0 = not known", low=-1, high=1
+    )
+    start_m: float = parameter(0.0, "chainage of its front when put into service", unit="m")
+    placed_m: float = parameter(50.0, "how far off that may be", unit="m", low=0.1, high=1e5)
+    line_chainage_m: tuple[float, ...] = parameter((), "chainages at equal steps", unit="m")
+    line_x_m: tuple[float, ...] = parameter((), "places of the line there, east", unit="m")
+    line_y_m: tuple[float, ...] = parameter((), "north", unit="m")
+    line_z_m: tuple[float, ...] = parameter((), "up", unit="m")
+    line_heading_rad: tuple[float, ...] = parameter((), "direction of the line", unit="rad")
+    station_slots: tuple[int, ...] = parameter((), "frequency slot of each station")
+    station_x_m: tuple[float, ...] = parameter((), "place of its antenna, east", unit="m")
+    station_y_m: tuple[float, ...] = parameter((), "north", unit="m")
+    station_z_m: tuple[float, ...] = parameter((), "up", unit="m")
+    station_hz: float = parameter(
+        0.026, "standard deviation of a station's oscillator", unit="Hz", low=0.0, high=1e3
+    )
+    walk_hz: float = parameter(
+        0.5, "random walk of the own oscillator after a second", unit="Hz", low=0.0, high=1e3
+    )
+    worst_sigma_m: float = parameter(
+        50.0, "a position more uncertain than this is not given", unit="m", low=0.01, high=1e4
+    )
+    localizer: bool = parameter(False, "whether a localizer waits for the positions")
+
+
+def positioner_of(p: DopplerPositionerParameters) -> DopplerPositioner:
+    """Positioner of the parameters.
+
+    Raises
+    ------
+    ParameterError
+        If they do not fit together.
+    """
+    plan = tone_plan_of(p)
+    try:
+        line = SurveyedLine(
+            np.array(p.line_chainage_m),
+            np.array(p.line_x_m),
+            np.array(p.line_y_m),
+            np.array(p.line_z_m),
+            np.array(p.line_heading_rad),
+        )
+        places = np.column_stack([p.station_x_m, p.station_y_m, p.station_z_m])
+        solver = DopplerSolver(
+            plan,
+            line,
+            places,
+            p.station_slots,
+            worst_sigma_m=p.worst_sigma_m,
+            grid_m=min(5.0, 0.25 * p.min_distance_m),
+        )
+    except ValueError as error:
+        raise ParameterError(f"doppler_positioner: {error}") from None
+    tracking = Tracking(p.max_speed_mps, p.placed_m, p.walk_hz, p.station_hz)
+    return DopplerPositioner(ToneReceiver(plan), solver, tracking, p.start_m, p.direction)
+
+
+class DopplerPositionerNode(Equipment):
+    """A positioner as a managed node; switched off it knows nothing."""
+
+    def __init__(
+        self,
+        name: str = "doppler",
+        *,
+        namespace: str = "/train_1",
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
+        self._p = p = declare(self, DopplerPositionerParameters)
+        self._train = train = namespace.strip("/")
+        self._positioner = positioner_of(p)
+        self._last_ns: int | None = None
+        self._fix = (
+            self.stream_out(DOPPLER_FIX, train=train)
+            if p.localizer
+            else self.publisher(DOPPLER_FIX, train=train).publish
+        )
+        self._table = TableWriter((train,), DOPPLER_FIX.columns)
+        self._position = self.publisher(DOPPLER_POSITION, train=train).publish
+        self._writer = PositionWriter(train, p.track)
+        self.stream_in(REFERENCE_RX, self._on_block, train=train)
+        self.announce_when_connected()
+
+    def on_activate(self, state: Any) -> Any:
+        """Switched on again, it knows nothing of what was before."""
+        self._positioner, self._last_ns = positioner_of(self._p), None
+        return super().on_activate(state)
+
+    def _on_block(self, raw: bytes) -> None:
+        silent_ns = silent_stamp_ns(raw)
+        block = None if silent_ns is not None else Waveform.from_cdr(raw)
+        stamp_ns = block.stamp_ns if block is not None else silent_ns
+        assert stamp_ns is not None
+        step_s = 0.0 if self._last_ns is None else (stamp_ns - self._last_ns) / NANOSECONDS
+        self._last_ns = stamp_ns
+        positioner = self._positioner
+        answer = Answer(Reason.TOO_FEW_STATIONS)
+        if self.switched_on:
+            answer = positioner.locate(None if block is None else block.row, step_s)
+        self._publish(stamp_ns, answer, positioner.tones)
+
+    def _publish(self, stamp_ns: int, answer: Answer, tones: int) -> None:
+        fix = answer.fix if answer.reason is Reason.NONE else None
+        place = Position(
+            stamp_ns, self._train, self._p.track, self._positioner.near_m, inf, 0.0, inf
+        )
+        figures = [float(answer.reason), *(np.nan,) * 5, float(tones), np.nan]
+        if fix is not None:
+            c = fix.covariance
+            figures[1:6] = fix.chainage_m, fix.speed_mps, c[0, 0], c[0, 1], c[1, 1]
+            figures[7] = fix.offset_hz
+            place = Position(
+                stamp_ns,
+                self._train,
+                self._p.track,
+                fix.chainage_m,
+                float(c[0, 0]),
+                fix.speed_mps,
+                float(c[1, 1]),
+            )
+        self._fix(self._table.write(stamp_ns, np.array([figures])))
+        self._position(self._writer.write(place))
+        trouble = "" if fix is not None else answer.reason.name.lower().replace("_", " ")
+        level = DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK
+        self.report(level, "position", trouble or "position known", stamp_ns=stamp_ns)
+
+
+def main() -> None:
+    """Run the positioner of a train on its own."""
+    run_node(DopplerPositionerNode)
+
+
+if __name__ == "__main__":
+    main()

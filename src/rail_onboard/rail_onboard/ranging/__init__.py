@@ -1,0 +1,1 @@
+"""Phase ranging between wayside and on-board stations."""

@@ -1,0 +1,117 @@
+"""Receiver of track codes on a train: from the antenna ahead of the first axle to the message.
+
+Topics in: ``rx``. Topics out: ``message``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from rail_msgs_py.node import Equipment
+from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.standalone import run_node
+from rail_msgs_py.table import TableWriter
+from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_RX
+from rail_msgs_py.waveform import Waveform
+from rail_signals.track_code.profile import load_profile, profile_names
+from rail_signals.track_code.receiver import FastTrackCodeReceiver
+from rail_signals.track_code.word import as_number
+
+from .carrier_selector import CarrierSelector
+
+_FIELDS = ("speed", "gradient", "block_length", "network")
+
+
+@dataclass(frozen=True)
+class TrackCodeReceiverParameters:
+    """Parameters of a receiver of track codes."""
+
+    profile: str = parameter("tones27", "profile of the code")
+    carriers_hz: tuple[float, ...] = parameter(
+        (1700.0, 2300.0), "carriers it listens to", unit="Hz", low=0.0
+    )
+    sample_rate_hz: float = parameter(
+        16_000.0, "sample rate at the antenna", unit="Hz", low=128.0, high=1e6
+    )
+    least_level_db: float = parameter(
+        -60.0, "level below which a carrier is not there", unit="dB", low=-200.0, high=100.0
+    )
+
+
+class TrackCodeReceiverNode(Equipment):
+    """Receiver of track codes as a managed node."""
+
+    def __init__(
+        self,
+        name: str = "track_code",
+        *,
+        namespace: str = "/train_1",
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
+        self._p = declare(self, TrackCodeReceiverParameters)
+        if self._p.profile not in profile_names():
+            raise ParameterError(
+                f"{name}: profile: {self._p.profile}: is none of {', '.join(profile_names())}"
+            )
+        self._profile = load_profile(self._p.profile)
+        rate_hz = self._p.sample_rate_hz
+        self._receivers = {
+            carrier_hz: FastTrackCodeReceiver(self._profile, carrier_hz, rate_hz)
+            for carrier_hz in self._p.carriers_hz
+        }
+        self._selector = CarrierSelector(self._p.carriers_hz, rate_hz, self._p.least_level_db)
+        train = namespace.strip("/")
+        self._publish = self.publisher(CODE_RECEIVED, train=train).publish
+        self._table = TableWriter((train,), CODE_RECEIVED.columns)
+        self._figures = np.zeros((1, len(CODE_RECEIVED.columns)))
+        self.stream_in(CODE_RX, self._on_block, train=train)
+        self.announce_when_connected()
+
+    def _on_block(self, raw: bytes) -> None:
+        block = Waveform.from_cdr(raw)
+        figures = self._figures[0]
+        figures[:] = 0.0
+        if self.switched_on and not block.silent:
+            samples = np.ascontiguousarray(block.row.real)
+            carrier_hz = self._selector.update(samples)
+            decisions = {
+                each_hz: receiver.feed(samples) for each_hz, receiver in self._receivers.items()
+            }
+            figures[-1] = self._selector.level_db
+            if carrier_hz is not None:
+                figures[0] = carrier_hz
+                self._show(decisions[carrier_hz], figures)
+        self._publish(self._table.write(block.stamp_ns, self._figures))
+        heard = bool(figures[0])
+        self.report(
+            DiagnosticStatus.OK if heard else DiagnosticStatus.WARN,
+            "pick-up",
+            "hears a carrier" if heard else "hears no carrier",
+            stamp_ns=block.stamp_ns,
+        )
+
+    def _show(self, decisions: list[Any], figures: np.ndarray[Any, Any]) -> None:
+        """The last decision of the tick, if it is valid."""
+        if not decisions or not decisions[-1].valid:
+            return
+        last = decisions[-1]
+        figures[1] = 1.0
+        figures[2] = as_number(last.bits)
+        figures[3:7] = [last.fields[field] for field in _FIELDS]
+
+
+def main() -> None:
+    """Run a receiver of track codes on its own."""
+    run_node(TrackCodeReceiverNode)
+
+
+if __name__ == "__main__":
+    main()

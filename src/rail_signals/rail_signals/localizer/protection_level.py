@@ -1,0 +1,174 @@
+"""The interval that holds the train, and what it is good for."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .filter_bank import BoolArray, FilterBank, FloatArray, S, V
+from .integrity_monitor import HYPOTHESES, IntegrityMonitor
+from .settings import SENSORS, IntegrityClaim
+
+IntArray: TypeAlias = NDArray[np.int64]
+
+
+class Status(IntEnum):
+    """What a position is good for."""
+
+    UNAVAILABLE = 0
+    UNMONITORED = 1
+    """Holds unless one of certain sensors is faulty."""
+    PROTECTED = 2
+    """Holds even if any one sensor is faulty."""
+
+
+class Reason(IntEnum):
+    """Why a position is not, or not fully, protected."""
+
+    NONE = 0
+    NO_FIX = 1
+    """No position has been received yet, or the last is too long ago."""
+    TOO_WIDE = 2
+    """The interval would be wider than any that is given."""
+    AMBIGUOUS = 3
+    """A sensor is faulty, and without one that it may be the position is not known."""
+    CONTRADICTION = 4
+    """More than one sensor must be faulty."""
+    TOO_FEW_SENSORS = 5
+    """Without one of the sensors the position would not be known."""
+    UNMONITORED_TOO_LONG = 6
+    """The same, for longer than it is put up with."""
+
+
+class Estimate(NamedTuple):
+    """What is known of every run [...].
+
+    Attributes
+    ----------
+    position_m, low_m, high_m : float64
+        Chainage and the interval that holds it; NaN and infinite where not available.
+    speed_mps, speed_low_mps, speed_high_mps : float64
+        The same of the speed, positive with chainage.
+    sigma_m : float64
+        Standard deviation of the position if no sensor is faulty.
+    status, reason : int64
+        As `Status` and `Reason`.
+    found : bool
+        Whether a sensor is known to be faulty.
+    excluded : bool [..., sensor]
+        Sensors that are left out.
+    uncovered : bool [..., sensor]
+        Sensors whose fault the interval does not survive.
+    """
+
+    position_m: FloatArray
+    low_m: FloatArray
+    high_m: FloatArray
+    speed_mps: FloatArray
+    speed_low_mps: FloatArray
+    speed_high_mps: FloatArray
+    sigma_m: FloatArray
+    status: IntArray
+    reason: IntArray
+    found: BoolArray
+    excluded: BoolArray
+    uncovered: BoolArray
+
+    @property
+    def protection_m(self) -> FloatArray:
+        """Protection level: within ``position_m`` ± this; infinite where not available."""
+        level_m = np.maximum(self.high_m - self.position_m, self.position_m - self.low_m)
+        return np.where(np.isnan(level_m), np.inf, level_m)
+
+
+class ClaimMaker:
+    """Turns the possible hypotheses into an interval.
+
+    Parameters
+    ----------
+    claim : IntegrityClaim
+    shape : tuple of int
+        Of the runs.
+    """
+
+    def __init__(self, claim: IntegrityClaim, shape: tuple[int, ...] = ()) -> None:
+        self._claim, self._sigmas = claim, claim.sigmas
+        self._unmonitored_s = np.zeros(shape)
+        none, all_well = np.zeros((*shape, SENSORS), np.bool_), np.zeros(shape, np.bool_)
+        protected = np.full(shape, int(Status.PROTECTED))
+        self._all_well = (protected, np.zeros(shape, np.int64), all_well, none, none)
+        for array in self._all_well:
+            array.setflags(write=False)
+
+    def estimate(self, bank: FilterBank, monitor: IntegrityMonitor, step_s: float) -> Estimate:
+        """What may be claimed at the end of a tick."""
+        at = bank.x[: V + 1, ..., :HYPOTHESES]
+        sigma = np.sqrt(bank.variances[: V + 1, ..., :HYPOTHESES])
+        half = self._sigmas * sigma
+        low, high = at - half, at + half
+        middle, sigma_m = at[..., 0].copy(), sigma[S, ..., 0]
+        if monitor.quiet and bank.known[..., :HYPOTHESES].all():
+            lowest, highest = low.min(axis=-1), high.max(axis=-1)
+            # So narrow that each of the intervals is, and the hull about any middle.
+            if (highest[S] - lowest[S]).max() <= self._claim.widest_m:
+                self._unmonitored_s.fill(0.0)
+                return _estimate(middle, lowest, highest, sigma_m, *self._all_well)
+
+        covered = bank.known[..., :HYPOTHESES] & (half[S] <= self._claim.widest_m)
+        possible = monitor.refuted_s <= 0.0
+        healthy = possible[..., 0]
+        excluded = monitor.excluded.sum(axis=-1)
+        # One sensor is faulty at most: once it is excluded, none of the others is.
+        considered = possible & ((excluded == 0)[..., None] | (np.arange(HYPOTHESES) == 0))
+        hull = considered & covered
+        low = np.where(hull, low, np.inf).min(axis=-1)
+        high = np.where(hull, high, -np.inf).max(axis=-1)
+        with np.errstate(invalid="ignore"):
+            middle = np.where(healthy, middle, 0.5 * (low + high))
+            wide = np.maximum(high - middle, middle - low)[S] > self._claim.widest_m
+        uncovered = considered[..., 1:] & ~covered[..., 1:]
+        some = uncovered.any(axis=-1)
+        contrary = ~possible.any(axis=-1) | (excluded > 1) | ((excluded == 1) & ~healthy)
+        reason = np.full(wide.shape, int(Reason.NONE))
+        # The last that applies is told.
+        for which, why in (
+            (some, Reason.TOO_FEW_SENSORS),
+            (wide | (healthy & ~covered[..., 0]), Reason.TOO_WIDE),
+            (healthy & ~bank.known[..., 0], Reason.NO_FIX),
+            (some & ~healthy, Reason.AMBIGUOUS),
+            (contrary, Reason.CONTRADICTION),
+        ):
+            reason[which] = why
+        few = reason == Reason.TOO_FEW_SENSORS
+        self._unmonitored_s = np.where(few, self._unmonitored_s + step_s, 0.0)
+        reason[self._unmonitored_s > self._claim.unmonitored_s] = Reason.UNMONITORED_TOO_LONG
+
+        status = np.full(reason.shape, int(Status.UNAVAILABLE))
+        status[reason == Reason.NONE] = Status.PROTECTED
+        status[reason == Reason.TOO_FEW_SENSORS] = Status.UNMONITORED
+        gone = status == Status.UNAVAILABLE
+        low, high = np.where(gone, -np.inf, low), np.where(gone, np.inf, high)
+        middle, sigma_m = np.where(gone, np.nan, middle), np.where(gone, np.inf, sigma_m)
+        found = ~healthy | (excluded > 0)
+        excluded_now = monitor.excluded.copy()
+        return _estimate(middle, low, high, sigma_m, status, reason, found, excluded_now, uncovered)
+
+
+def _estimate(
+    middle: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    sigma_m: FloatArray,
+    status: IntArray,
+    reason: IntArray,
+    found: BoolArray,
+    excluded: BoolArray,
+    uncovered: BoolArray,
+) -> Estimate:
+    return Estimate(
+        *(middle[S], low[S], high[S], middle[V], low[V], high[V]),
+        *(sigma_m, status, reason, found, excluded, uncovered),
+    )

@@ -1,0 +1,208 @@
+"""Receiver that fits carrier and spectral lines of an FM ranging signal.
+
+A discriminator forms the phase of each noisy sample and so has a threshold near 10 dB.
+The lines of the wave (`line_spectrum`) carry the same phase information and can be
+summed over the burst before anything non-linear happens: the estimate stays at the
+bound ``1 / (gamma N beta^2)`` tens of decibels lower.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .detector import detection_share
+from .fm_spectrum import line_spectrum
+from .offset_search import OffsetSearch, RealArray
+from .signal import ComplexArray, FloatArray, RangingSignal
+from .tone_fit import LineFit
+
+MAX_SNR = 1e9
+"""Ceiling of the estimated carrier-to-noise ratio (90 dB), where aliased and overlapping
+lines of the order of 1e-9 of the power begin to matter."""
+
+MAX_SNR_SINGLE = 1e6
+"""The same for bursts in single precision (60 dB), where rounding begins to matter."""
+
+_STRONG_SHARE = 0.92
+_CHUNK_BYTES = 3 << 18
+
+
+@dataclass(frozen=True)
+class ToneEstimate:
+    """What a receiver found in each burst. Leading axes are those of the bursts.
+
+    Where nothing was detected, phases, offset and misfit are NaN, the variance is
+    infinite, amplitude and snr are zero.
+
+    Attributes
+    ----------
+    phase_lag_rad : float [..., tones]
+        Phase lag of each tone [rad] in [0, 2 pi).
+    variance_rad2 : float [..., tones]
+        Its variance [rad^2]: the bound at the estimated `snr`.
+    amplitude : float [...]
+        Amplitude of the carrier, of a wave of constant envelope.
+    snr : float [...]
+        Carrier-to-noise ratio per complex sample (linear), at most `MAX_SNR`.
+    frequency_offset_hz : float [...]
+        Offset of the carrier [Hz].
+    misfit : float [...]
+        Chi-square per degree of freedom of what the fit leaves on the lines, in terms of
+        the noise between them. About 1 for one FM signal in white noise; large where a
+        second signal or a jammer lies on the lines.
+    detected : bool [...]
+        Whether the lines hold more energy than noise would put there.
+    """
+
+    phase_lag_rad: FloatArray
+    variance_rad2: FloatArray
+    amplitude: FloatArray
+    snr: FloatArray
+    frequency_offset_hz: FloatArray
+    misfit: FloatArray
+    detected: NDArray[np.bool_]
+
+
+class LineReceiver:
+    """Maximum-likelihood receiver of a `RangingSignal` in white noise.
+
+    1. Offset (`OffsetSearch`): the strong lines of the periods, correlated with a grid of
+       frequencies half a cycle per burst apart; the largest sum of squares is interpolated.
+    2. Fold: the periods are added after turning back by the offset, about the middle of the
+       burst, where the phases of carrier and tones do not depend on the offset's error.
+       The transform of the sum holds every line; what is left of the energy is noise.
+    3. Phases (`LineFit`): products of neighbouring lines start a Gauss-Newton step. A second
+       step would change the error by less than 0.3 % from -10 dB upwards, and by 1.3 % at
+       -13 dB with two tones (960 samples).
+
+    Parameters
+    ----------
+    signal
+        The signal to receive.
+    max_offset_hz
+        Largest carrier offset to expect [Hz]; 0 if the carrier is exact.
+    false_alarm
+        Probability that noise alone counts as detected, per burst.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range for the signal; the message quotes it.
+
+    Examples
+    --------
+    >>> from rail_signals.ranging.signal import modulate
+    >>> receiver = LineReceiver(RangingSignal())
+    >>> found = receiver.estimate(modulate(RangingSignal(), [[0.5], [4.0]]))
+    >>> found.phase_lag_rad.ravel().round(9).tolist(), found.detected.tolist()
+    ([0.5, 4.0], [True, True])
+    """
+
+    def __init__(
+        self, signal: RangingSignal, *, max_offset_hz: float = 5e3, false_alarm: float = 1e-6
+    ) -> None:
+        if not (math.isfinite(max_offset_hz) and max_offset_hz >= 0):
+            raise ValueError(
+                f"max_offset_hz must be finite and not negative, got {max_offset_hz!r}"
+            )
+        self.signal = signal
+        self._period = signal.period_samples
+        self._periods = signal.samples // self._period
+        if self._periods < 2:
+            raise ValueError(
+                f"samples must hold two periods of {self._period} or more, got {signal.samples}"
+            )
+        lines = line_spectrum(signal)
+        strong = lines.strongest(_STRONG_SHARE)
+        self._search = OffsetSearch(signal, strong, max_offset_hz) if max_offset_hz > 0 else None
+        self._weights = self._search.tapers if self._search else np.ones((1, self._periods))
+        search_hz = self._search.width_hz if self._search else 0.0
+        samples = signal.samples
+        share = detection_share(
+            false_alarm, len(strong.bins), samples, search_hz, signal.duration_s
+        )
+        self._fit = LineFit(signal, lines, strong, share)
+
+    def estimate(self, bursts: ArrayLike) -> ToneEstimate:
+        """Estimate tone phases, offset, amplitude and noise of each burst.
+
+        The result of a burst does not depend, to the last bit, on the others in the batch.
+
+        Parameters
+        ----------
+        bursts : complex [..., samples]
+            Received complex envelopes. Bursts that are zero or not finite count as not
+            detected. Sums over a burst in single precision (complex64) are formed in single
+            precision, twice as fast; all that follows is in double precision.
+
+        Returns
+        -------
+        ToneEstimate
+        """
+        x = np.asarray(bursts)
+        if x.dtype != np.complex64:
+            x = np.asarray(x, dtype=np.complex128)
+        samples = self.signal.samples
+        if x.ndim == 0 or x.shape[-1] != samples:
+            raise ValueError(f"bursts must have {samples} samples, got shape {x.shape}")
+        lead = x.shape[:-1]
+        real, max_snr = _SINGLE if x.dtype == np.complex64 else _DOUBLE
+        parts = np.ascontiguousarray(x).reshape(-1, samples).view(real)
+        with np.errstate(all="ignore"):
+            # In pieces that stay in the processor's cache.
+            step = max(1, _CHUNK_BYTES // (samples * x.itemsize))
+            if len(parts) <= step or self._weights is not None:
+                energy, offset_hz, folded = self._fold_bursts(parts, step)
+            else:
+                pieces = [
+                    self._fold_bursts(parts[i : i + step], step) for i in range(0, len(parts), step)
+                ]
+                energy, offset_hz, folded = map(np.concatenate, zip(*pieces, strict=True))
+            table, detected = self._fit.evaluate(energy, offset_hz, folded, max_snr)
+        tones = len(self.signal.tones_hz)
+        table = table.reshape(*lead, 2 * tones + 4)
+        return ToneEstimate(
+            table[..., :tones],
+            table[..., tones:-4],
+            table[..., -4],
+            table[..., -3],
+            table[..., -2],
+            table[..., -1],
+            detected.reshape(lead),
+        )
+
+    def _fold_bursts(
+        self, parts: RealArray, step: int
+    ) -> tuple[RealArray, FloatArray, ComplexArray]:
+        """Energy, offset [batch] and folded period [batch, 1, period] of bursts."""
+        energy, rows = self._sum_bursts(parts, step)
+        if self._search:
+            offset_hz = self._search.offset_hz(rows)
+            return energy, offset_hz, self._search.fold(rows, offset_hz)
+        return energy, np.zeros(len(parts)), rows.astype(np.float64).view(np.complex128)
+
+    def _sum_bursts(self, parts: RealArray, step: int) -> tuple[RealArray, RealArray]:
+        """Energy [batch] and the rows of `OffsetSearch.fold` of bursts [batch, 2 samples].
+
+        Weighted sums are made of `step` bursts at a time.
+        """
+        batch = len(parts)
+        rows = parts.reshape(batch, self._periods, 2 * self._period)
+        if self._weights is None:
+            return np.vecdot(parts, parts), rows
+        weights = self._weights.astype(parts.dtype)
+        energy = np.empty(batch, dtype=parts.dtype)
+        sums = np.empty((batch, len(weights), rows.shape[2]), dtype=parts.dtype)
+        for i in range(0, batch, step):
+            piece = slice(i, i + step)
+            np.vecdot(parts[piece], parts[piece], out=energy[piece])
+            np.matmul(weights, rows[piece], out=sums[piece])
+        return energy, sums
+
+
+_SINGLE = (np.dtype(np.float32), MAX_SNR_SINGLE)
+_DOUBLE = (np.dtype(np.float64), MAX_SNR)

@@ -1,0 +1,1 @@
+"""The train bus: its cable, frames on it, and its reflectometer."""

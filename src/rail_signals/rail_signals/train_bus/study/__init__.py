@@ -1,0 +1,1 @@
+"""Studies of fault detection on the bus cable."""

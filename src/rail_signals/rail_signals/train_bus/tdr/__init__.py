@@ -1,0 +1,1 @@
+"""Time-domain reflectometry of the bus cable: from traces to faults."""

@@ -1,0 +1,297 @@
+"""Channel estimation from pilots: Wiener interpolation of a Jakes channel.
+
+Blocks of known symbols stand at both ends of a burst and between its data. Within a block the
+antennas send orthogonal rows of +-1, so that each receiver tells them apart:
+
+    y_p = sum_a X_{a,p} h_a(t_p) + z_p
+
+With ``E[h_a(t) h_b(t')*] = P delta_{ab} J0(2 pi f_D (t - t'))`` and white noise of variance sigma^2
+the estimate of least mean square error of every ``h_a(t)`` is linear in the pilots,
+
+    W = snr C (snr K + I)^-1,    K = sum_a X_a X_a^T * J0(t_p - t_q),   C_a = J0(t - t_q) X_{a,q}
+
+with ``snr = P / sigma^2`` and the error variance ``P (1 - diag(W C^T))``. The eigenvectors of K are
+those of every SNR: they are found once per pattern and Doppler, and each burst is estimated at
+its own SNR, which the same eigenvectors tell (maximum likelihood of a Gaussian channel).
+
+Nothing assumes the channel constant within a block or an Alamouti pair. A line of sight has a
+Doppler within the band of Jakes and is followed too, though its power is not spread as assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import j0
+
+from rail_signals.ranging.signal import ComplexArray, FloatArray
+
+MAX_SNR = 1e6
+"""Ceiling of the estimated SNR (60 dB)."""
+
+_LEVELS = 10.0 ** (np.arange(-20, 61) / 10)
+_LEAST_DOPPLER = 1e-6
+_BINS_PER_OCTAVE = 4
+
+
+@dataclass(frozen=True)
+class PilotPattern:
+    """Where the pilots of a burst stand, and what they are.
+
+    A block of pilots begins every `period` symbols; the last block follows the last data. To
+    follow a channel of Doppler f_D, `period` must stay well below ``1 / (2 f_D T)`` symbols: at
+    half of it the error already doubles, near it neither channel nor level can be told.
+
+    Parameters
+    ----------
+    data_symbols
+        Data symbols n of a burst; even with two antennas.
+    transmit
+        Transmit antennas, 1 or 2.
+    period
+        Symbols from the start of one block to the next; even.
+    block
+        Symbols in a block; even, below `period`, so that no pair of data is parted.
+
+    Examples
+    --------
+    >>> pattern = PilotPattern(data_symbols=6, transmit=2, period=6)
+    >>> pattern.symbols, pattern.pilot_positions.tolist(), pattern.data_positions.tolist()
+    (12, [0, 1, 6, 7, 10, 11], [2, 3, 4, 5, 8, 9])
+    """
+
+    data_symbols: int
+    transmit: int = 2
+    period: int = 16
+    block: int = 2
+
+    def __post_init__(self) -> None:
+        """Validate every field."""
+        if self.transmit not in (1, 2):
+            raise ValueError(f"transmit must be 1 or 2 antennas, got {self.transmit!r}")
+        if self.data_symbols < 1 or self.data_symbols % self.transmit:
+            raise ValueError(
+                f"data_symbols must be whole blocks of {self.transmit}, got {self.data_symbols!r}"
+            )
+        if self.block < 2 or self.block % 2:
+            raise ValueError(f"block must be even and positive, got {self.block!r}")
+        if self.period <= self.block or self.period % 2:
+            raise ValueError(f"period must be even and above {self.block}, got {self.period!r}")
+
+    @property
+    def symbols(self) -> int:
+        """Symbols of the burst, pilots and data."""
+        return self.data_symbols + (self._stretches + 1) * self.block
+
+    @property
+    def pilot_share(self) -> float:
+        """Share of the energy of a burst that the pilots take."""
+        return 1 - self.data_symbols / self.symbols
+
+    @cached_property
+    def data_positions(self) -> NDArray[np.intp]:
+        """Places of the data, intp [data_symbols]."""
+        place = np.arange(self.data_symbols)
+        return np.asarray(place + (place // (self.period - self.block) + 1) * self.block)
+
+    @cached_property
+    def pilot_positions(self) -> NDArray[np.intp]:
+        """Places of the pilots, intp [pilots]."""
+        free = np.ones(self.symbols, dtype=np.bool_)
+        free[self.data_positions] = False
+        return np.flatnonzero(free)
+
+    @cached_property
+    def pilots(self) -> FloatArray:
+        """Pilots of each antenna, float64 [tx, pilots], of total power 1."""
+        count = len(self.pilot_positions)
+        rows = np.ones((self.transmit, count))
+        rows[1:, 1::2] = -1
+        return rows / math.sqrt(self.transmit)
+
+    def insert(self, data: ArrayLike) -> ComplexArray:
+        """Burst complex128 [..., tx, symbols] of data complex [..., tx, n]."""
+        x = np.asarray(data, dtype=np.complex128)
+        if x.ndim < 2 or x.shape[-2:] != (self.transmit, self.data_symbols):
+            raise ValueError(
+                f"data must be [..., {self.transmit}, {self.data_symbols}], got shape {x.shape}"
+            )
+        burst = np.empty((*x.shape[:-1], self.symbols), dtype=np.complex128)
+        burst[..., self.pilot_positions] = self.pilots
+        burst[..., self.data_positions] = x
+        return burst
+
+    @property
+    def _stretches(self) -> int:
+        return -(-self.data_symbols // (self.period - self.block))
+
+
+@dataclass(frozen=True)
+class PilotLevel:
+    """What the pilots of each burst say of its level. Axes are the leading ones of the bursts.
+
+    Attributes
+    ----------
+    snr : float64 [...]
+        Mean channel power over noise variance (linear), on a grid of 1 dB; at most `MAX_SNR`.
+    noise_variance : float64 [...]
+        Variance of the noise per symbol.
+    evidence : float64 [...]
+        Log-likelihood ratio of a channel in noise against noise alone. Noise exceeds a value t
+        with a probability below ``exp(-t)`` (measured: a fifth of it at most).
+    """
+
+    snr: FloatArray
+    noise_variance: FloatArray
+    evidence: FloatArray
+
+
+class WienerEstimator:
+    """Estimator of one pattern at one Doppler; see :func:`wiener_estimator` for a cached one.
+
+    Parameters
+    ----------
+    pattern
+        Pilots of the burst.
+    doppler_per_symbol
+        Maximum Doppler times symbol duration, ``f_D T``, from 0 to below 0.5.
+
+    Examples
+    --------
+    >>> pattern = PilotPattern(data_symbols=28, transmit=1)
+    >>> estimator = WienerEstimator(pattern, 0.0)
+    >>> channel = estimator.estimate(0.3j * pattern.pilots, 1e6)
+    >>> channel.shape, bool(np.allclose(channel, 0.3j))
+    ((1, 1, 34), True)
+    """
+
+    def __init__(self, pattern: PilotPattern, doppler_per_symbol: float) -> None:
+        if not 0 <= doppler_per_symbol < 0.5:
+            raise ValueError(
+                f"doppler_per_symbol must lie from 0 to below 0.5, got {doppler_per_symbol!r}"
+            )
+        self.pattern = pattern
+        self.doppler_per_symbol = float(doppler_per_symbol)
+        count = pattern.symbols
+        correlation = j0(2 * math.pi * doppler_per_symbol * np.arange(count))
+        at, pilots = pattern.pilot_positions, pattern.pilots
+        between = correlation[np.abs(at[:, None] - at)] * (pilots.T @ pilots)
+        values, vectors = np.linalg.eigh(between)
+        self._values = np.maximum(values, 0.0)
+        self._vectors = vectors
+        ahead = correlation[np.abs(np.arange(count)[:, None] - at)] * pilots[:, None, :]
+        # [tx symbols, pilots]: covariance of the channel with the pilots' eigenvectors.
+        self._map = ahead.reshape(-1, len(at)) @ vectors
+        self._map_squared = self._map**2
+        self._shrink = 1 / (_LEVELS[:, None] * self._values + 1)
+        self._penalty = -np.sum(np.log(self._shrink), axis=1)
+
+    def level(self, received: ArrayLike) -> PilotLevel:
+        """Level of bursts from their pilots complex [..., rx, pilots].
+
+        Channel power and noise are taken as common to the receive antennas.
+        """
+        v = self._eigen(self._check(received))
+        energy = np.sum(v.real**2 + v.imag**2, axis=-2)
+        antennas, count = v.shape[-2:]
+        variance = np.matmul(self._shrink, energy[..., None])[..., 0] / (antennas * count)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            cost = antennas * (count * np.log(variance) + self._penalty)
+            alone = antennas * count * np.log(energy.mean(axis=-1) / antennas)
+        best = np.argmin(cost, axis=-1)[..., None]
+        evidence = np.zeros(best.shape[:-1])
+        some = energy.sum(axis=-1) > 0
+        np.subtract(
+            alone, np.take_along_axis(cost, best, axis=-1)[..., 0], out=evidence, where=some
+        )
+        noise = np.take_along_axis(variance, best, axis=-1)[..., 0]
+        return PilotLevel(np.asarray(_LEVELS[best[..., 0]]), noise, np.maximum(evidence, 0.0))
+
+    def estimate(self, received: ArrayLike, snr: ArrayLike) -> ComplexArray:
+        """Channel at every symbol of the burst.
+
+        Parameters
+        ----------
+        received : complex [..., rx, pilots]
+            Symbols received at the pilots' places.
+        snr : float [...]
+            Mean channel power over noise variance (linear).
+
+        Returns
+        -------
+        complex128 [..., rx, tx, symbols]
+        """
+        y = self._check(received)
+        weight = self._weight(snr)
+        z = np.ascontiguousarray(self._eigen(y) * weight[..., None, :])
+        # Burst by burst and in real arithmetic: independent of how many there are.
+        parts = np.matmul(self._map, z.view(np.float64).reshape(*z.shape, 2))
+        shape = (*z.shape[:-1], self.pattern.transmit, self.pattern.symbols)
+        return np.asarray(np.ascontiguousarray(parts).view(np.complex128).reshape(shape))
+
+    def error_variance(self, snr: ArrayLike) -> FloatArray:
+        """Predicted error variance of `estimate` as a share of the channel power.
+
+        It holds for a channel of the Doppler of this estimator.
+
+        Parameters
+        ----------
+        snr : float [...]
+            Mean channel power over noise variance (linear).
+
+        Returns
+        -------
+        float64 [..., tx, symbols]
+        """
+        weight = self._weight(snr)
+        explained = np.matmul(self._map_squared, weight[..., None])[..., 0]
+        shape = (*weight.shape[:-1], self.pattern.transmit, self.pattern.symbols)
+        return np.asarray(np.maximum(1 - explained.reshape(shape), 0.0), dtype=np.float64)
+
+    def _weight(self, snr: ArrayLike) -> FloatArray:
+        level = np.asarray(snr, dtype=np.float64)[..., None]
+        if not (np.isfinite(level) & (level >= 0)).all():
+            raise ValueError(f"snr must be finite and not negative, got {snr!r}")
+        return np.asarray(level / (level * self._values + 1))
+
+    def _eigen(self, received: ComplexArray) -> ComplexArray:
+        """Pilots along the eigenvectors, complex128 [..., rx, pilots]."""
+        y = np.ascontiguousarray(received)
+        parts = np.matmul(self._vectors.T, y.view(np.float64).reshape(*y.shape, 2))
+        return np.asarray(np.ascontiguousarray(parts).view(np.complex128)[..., 0])
+
+    def _check(self, received: ArrayLike) -> ComplexArray:
+        y = np.asarray(received, dtype=np.complex128)
+        count = len(self.pattern.pilot_positions)
+        if y.ndim < 2 or y.shape[-2] < 1 or y.shape[-1] != count:
+            raise ValueError(f"received must be [..., rx, {count}], got shape {y.shape}")
+        return y
+
+
+def wiener_estimator(pattern: PilotPattern, doppler_per_symbol: float) -> WienerEstimator:
+    """Estimator for the next Doppler upward on a grid of quarter octaves, from a cache.
+
+    A Doppler assumed up to 19 % too high costs little; one too low would cost much. Whatever is
+    below 1e-6 per symbol counts as 1e-6.
+
+    Examples
+    --------
+    >>> pattern = PilotPattern(data_symbols=28)
+    >>> round(wiener_estimator(pattern, 0.00667).doppler_per_symbol, 5)
+    0.00689
+    """
+    if not 0 <= doppler_per_symbol < 0.4:
+        raise ValueError(
+            f"doppler_per_symbol must lie from 0 to below 0.4, got {doppler_per_symbol!r}"
+        )
+    octaves = math.log2(max(doppler_per_symbol, _LEAST_DOPPLER) / _LEAST_DOPPLER)
+    return _binned(pattern, math.ceil(octaves * _BINS_PER_OCTAVE - 1e-9))
+
+
+@lru_cache(maxsize=128)
+def _binned(pattern: PilotPattern, step: int) -> WienerEstimator:
+    return WienerEstimator(pattern, _LEAST_DOPPLER * 2.0 ** (step / _BINS_PER_OCTAVE))

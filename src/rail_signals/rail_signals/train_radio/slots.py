@@ -1,0 +1,99 @@
+"""Time slots of the train radio: bursts one after the other within a block.
+
+Slot 0 is the base station's beacon, by which trains choose their base station; slot n is that of
+train n, on the way down and on the way up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rail_signals.ranging.signal import ComplexArray
+
+from .burst import RadioBurstFormat
+from .symbol_mapping import BitArray
+
+BEACON_SLOT = 0
+
+
+@dataclass(frozen=True)
+class RadioSlots:
+    """Where bursts lie in a block.
+
+    Parameters
+    ----------
+    burst
+        Format of every burst.
+    trains
+        Slots for trains, after that of the beacon.
+    """
+
+    burst: RadioBurstFormat
+    trains: int
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        if self.trains < 1:
+            raise ValueError(f"trains must be 1 or more, got {self.trains!r}")
+        if self.burst.data_bits % 8:
+            raise ValueError(f"data_bits must be whole bytes, got {self.burst.data_bits!r}")
+
+    @property
+    def count(self) -> int:
+        """Slots of a block, that of the beacon included."""
+        return 1 + self.trains
+
+    @property
+    def samples(self) -> int:
+        """Samples of a block."""
+        return self.count * self.burst.samples
+
+    @property
+    def duration_s(self) -> float:
+        """Length of a block [s]."""
+        return self.samples / self.burst.sample_rate_hz
+
+    def span(self, slot: int) -> tuple[int, int]:
+        """First sample of a slot, and the first one after it."""
+        if not 0 <= slot < self.count:
+            raise ValueError(f"slot must be from 0 to {self.count - 1}, got {slot!r}")
+        return slot * self.burst.samples, (slot + 1) * self.burst.samples
+
+    def bursts(self, frames: Sequence[bytes]) -> ComplexArray:
+        """Waves of unit energy per symbol that carry frames, complex128 [frame, tx, sample]."""
+        bits = np.zeros((0, self.burst.data_bits), dtype=np.uint8)
+        return self.burst.transmit(bits_of(frames) if frames else bits)
+
+    def block(self, frames: Mapping[int, bytes]) -> ComplexArray:
+        """Block with a frame in each slot named, zero elsewhere; complex128 [tx, samples]."""
+        wave = np.zeros((self.burst.scheme.transmit, self.samples), dtype=np.complex128)
+        for slot, burst in zip(frames, self.bursts(list(frames.values())), strict=True):
+            first, end = self.span(slot)
+            wave[:, first:end] = burst
+        return wave
+
+    def cut(self, samples: ComplexArray) -> ComplexArray:
+        """Slots of received samples [rx, slots * burst], as a view [slot, rx, burst]."""
+        parts = samples.reshape(samples.shape[0], -1, self.burst.samples)
+        return np.asarray(parts.transpose(1, 0, 2))
+
+
+def bits_of(frames: Sequence[bytes]) -> BitArray:
+    """Bits of frames of equal length, uint8 [frame, bit].
+
+    Examples
+    --------
+    >>> bits_of([bytes([0x81])]).tolist()
+    [[1, 0, 0, 0, 0, 0, 0, 1]]
+    """
+    octets = np.frombuffer(b"".join(frames), dtype=np.uint8).reshape(len(frames), -1)
+    return np.unpackbits(octets, axis=1)
+
+
+def frame_of(bits: NDArray[np.uint8]) -> bytes:
+    """Bytes of one frame's bits [bit]."""
+    return np.packbits(bits).tobytes()

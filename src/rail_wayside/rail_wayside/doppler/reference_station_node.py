@@ -1,0 +1,79 @@
+"""Reference station: sends its tone, the same in every tick.
+
+Topics in: ``/clock``. Topics out: ``tone``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
+from rail_msgs_py.node import Equipment
+from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.stamps import clock_from_cdr
+from rail_msgs_py.standalone import run_node
+from rail_msgs_py.topics.doppler import REFERENCE_TX
+from rail_msgs_py.topics.tick import CLOCK
+from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
+from rail_signals.doppler.signal import reference_tone
+
+_CHANNEL = 1
+
+
+@dataclass(frozen=True)
+class ReferenceStationParameters(ReferenceToneParameters):
+    """Parameters of a reference station."""
+
+    slot: int = parameter(0, "frequency slot of its tone", low=0, high=1000)
+    power_dbm: float = parameter(20.0, "radiated power", unit="dBm", low=-100.0, high=60.0)
+    tick_s: float = parameter(0.1, "time of a tick", unit="s", low=0.01, high=1.0)
+
+
+class ReferenceStationNode(Equipment):
+    """A reference station as a managed node; switched off it is silent."""
+
+    def __init__(
+        self,
+        name: str = "reference",
+        *,
+        namespace: str = "/wayside/ref1",
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
+        p = declare(self, ReferenceStationParameters)
+        plan = tone_plan_of(p)
+        if not p.slot < plan.slots:
+            raise ParameterError(f"slot: {p.slot} is not below {plan.slots}, the number of slots")
+        cycles = plan.slot_offset_hz(p.slot) * p.tick_s
+        if abs(cycles - round(cycles)) > 1e-6:
+            raise ParameterError(f"tick_s: {p.tick_s:g} s is not a whole number of periods")
+        # Waves of mean power 1 mW have amplitude 1.
+        samples = 10.0 ** (p.power_dbm / 20.0) * reference_tone(plan, p.slot)
+        radio = (plan.sample_rate_hz, plan.carrier_hz, _CHANNEL)
+        self._tone = RepeatedBlock(Waveform(0, *radio, samples[None, :]))
+        self._silence = RepeatedBlock(silence(0, *radio))
+        station = namespace.rpartition("/")[2]
+        self._send = self.stream_out(REFERENCE_TX, station=station)
+        self.stream_in(CLOCK, self._on_clock)
+        self.announce_when_connected()
+
+    def _on_clock(self, raw: bytes) -> None:
+        stamp_ns = clock_from_cdr(raw)
+        self._send((self._tone if self.switched_on else self._silence).at(stamp_ns))
+        message = "sends its tone" if self.switched_on else "switched off"
+        self.report(DiagnosticStatus.OK, "tone", message, stamp_ns=stamp_ns)
+
+
+def main() -> None:
+    """Run a reference station on its own."""
+    run_node(ReferenceStationNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,293 @@
+"""From ranges to trains: the zone controller's estimator.
+
+A transponder does not say which train it is on. As the signaller's train describer does, the
+controller knows which trains enter where, and then follows each from zone to zone: a reading
+belongs to the train that can have got there (`rail_wayside.ranging.association`). What cannot be
+told is flagged, not guessed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from .association import FOLLOWED_S, Candidate, LineOrder, associate
+from .zone_map import ZoneMap
+
+MAX_ACCELERATION_MPS2 = 2.0
+#: A train that had been lost is claimed to be known only after so long: what came back may be
+#: another one's signal, or two stations' on one channel.
+CONFIRMED_S = 1.5
+GATE_M = 12.0
+SIGMAS = 6.0
+MAX_SPEED_MPS = 160.0
+#: Process noise of the speed estimate: acceleration, 1 sigma.
+ACCELERATION_SIGMA_MPS2 = 0.7
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A range in a zone; NaN = a signal that cannot be read, inf = none."""
+
+    range_m: float
+    variance_m2: float
+
+
+NOT_HEARD = Reading(math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class Fix:
+    """Where a train is. Infinite variance: not known, the chainage is the last that was."""
+
+    train: str
+    zone: str
+    track: str
+    chainage_m: float
+    variance_m2: float
+    speed_mps: float
+    speed_variance_m2ps2: float
+    reason: str = ""
+
+
+@dataclass
+class _Train:
+    name: str
+    zone: str
+    chainage_m: float
+    entered: bool = False
+    seen_s: float = 0.0
+    regained_s: float = -math.inf
+    speed_mps: float = 0.0
+    # Covariance of the filter on (chainage, speed).
+    p_ss: float = 0.0
+    p_sv: float = 0.0
+    p_vv: float = 0.0
+    filtered_m: float = 0.0
+    fix: Fix | None = None
+    unknown: str = field(default="not on the line yet")
+
+
+@dataclass(frozen=True)
+class _Place:
+    zone: str
+    chainage_m: float
+    variance_m2: float
+
+
+class ZoneTracker:
+    """Follows every train along the corridor.
+
+    Parameters
+    ----------
+    zone_map : ZoneMap
+    trains : sequence of (train, zone)
+        Trains in the order in which they enter the line, and the zone they are first seen in.
+    """
+
+    def __init__(self, zone_map: ZoneMap, trains: Sequence[tuple[str, str]]) -> None:
+        self._map = zone_map
+        self._trains = [_Train(name, zone, zone_map.zones[zone].start_m) for name, zone in trains]
+        self._order = LineOrder()
+        self.unidentified: tuple[str, ...] = ()
+        self.disturbed: tuple[str, ...] = ()
+
+    def update(self, time_s: float, readings: Mapping[str, Reading]) -> list[Fix]:
+        """Fixes of all trains from the readings [zone] of one tick."""
+        places: list[_Place] = []
+        disturbed: list[str] = []
+        for name, reading in readings.items():
+            if reading is NOT_HEARD:
+                continue
+            if math.isnan(reading.range_m):
+                disturbed.append(name)
+            elif math.isfinite(reading.range_m):
+                found = self._map.zones[name].locate(reading.range_m, reading.variance_m2)
+                if found is not None:
+                    places.append(_Place(name, *found))
+        self.disturbed = tuple(disturbed)
+        owners = self._assign(time_s, places)
+        self.unidentified = tuple(
+            place.zone for index, place in enumerate(places) if index not in owners.values()
+        )
+        self._learn_order(owners, places)
+        shared = self._shared_zones(owners, places)
+        fixes = []
+        for index, train in enumerate(self._trains):
+            if index in owners:
+                self._follow(train, time_s, places[owners[index]])
+            fixes.append(self._fix(train, index in owners, shared, readings))
+        return fixes
+
+    def _assign(self, time_s: float, places: Sequence[_Place]) -> dict[int, int]:
+        """Index of the place of each train."""
+        candidates: list[Candidate] = []
+        due: set[str] = set()
+        for index, train in enumerate(self._trains):
+            if train.entered:
+                misses = self._misses(train, time_s, places)
+                followed = time_s - train.seen_s <= FOLLOWED_S
+                candidates.append(Candidate(index, followed, misses))
+            elif train.zone not in due:
+                # Trains that are due at a zone enter there in their order.
+                due.add(train.zone)
+                here = (n for n, place in enumerate(places) if place.zone == train.zone)
+                candidates.append(Candidate(index, False, dict.fromkeys(here, 0.0)))
+        ways_m = {
+            (one, other): self._way_m(places[one], places[other])
+            for one in range(len(places))
+            for other in range(len(places))
+            if one != other
+        }
+        return associate(candidates, ways_m, self._order)
+
+    def _misses(self, train: _Train, time_s: float, places: Sequence[_Place]) -> dict[int, float]:
+        """How far each place in reach is from where the train is expected, over what it may be."""
+        elapsed_s = time_s - train.seen_s
+        expected_m = train.speed_mps * elapsed_s
+        sigma_m = math.sqrt(max(train.p_vv, 0.0)) * elapsed_s
+        gate_m = GATE_M + 0.5 * MAX_ACCELERATION_MPS2 * elapsed_s**2 + SIGMAS * sigma_m
+        gate_m = min(gate_m, GATE_M + MAX_SPEED_MPS * elapsed_s)
+        misses: dict[int, float] = {}
+        for number, place in enumerate(places):
+            way_m = self._map.way_m(train.zone, train.filtered_m, place.zone, place.chainage_m)
+            if way_m is None:
+                continue
+            miss_m = abs(way_m - expected_m)
+            slack_m = gate_m + SIGMAS * math.sqrt(place.variance_m2)
+            if miss_m <= slack_m:
+                misses[number] = miss_m / slack_m
+        return misses
+
+    def _way_m(self, one: _Place, other: _Place) -> float | None:
+        return self._map.way_m(one.zone, one.chainage_m, other.zone, other.chainage_m)
+
+    def _learn_order(self, owners: Mapping[int, int], places: Sequence[_Place]) -> None:
+        """Take note of who is ahead of whom among the trains seen now."""
+        seen = sorted(owners)
+        for position, one in enumerate(seen):
+            for other in seen[position + 1 :]:
+                here, there = places[owners[one]], places[owners[other]]
+                way_m = self._way_m(here, there)
+                zones = self._map.zones
+                if way_m is None and zones[here.zone].track == zones[there.zone].track:
+                    continue  # out of sight of each other, in an order that stays
+                self._order.learn(one, other, way_m)
+
+    def _follow(self, train: _Train, time_s: float, place: _Place) -> None:
+        """Step the train's filter on (chainage, speed) with a new place."""
+        if not train.entered:
+            train.entered = True
+            train.zone, train.filtered_m = place.zone, place.chainage_m
+            train.p_ss, train.p_sv, train.p_vv = place.variance_m2, 0.0, 30.0**2
+        else:
+            elapsed_s = time_s - train.seen_s
+            if elapsed_s > FOLLOWED_S:
+                train.regained_s = time_s
+            way_m = self._map.way_m(train.zone, train.filtered_m, place.zone, place.chainage_m)
+            assert way_m is not None
+            noise = ACCELERATION_SIGMA_MPS2**2
+            train.p_ss += elapsed_s * (2.0 * train.p_sv + elapsed_s * train.p_vv)
+            train.p_ss += 0.25 * noise * elapsed_s**4
+            train.p_sv += elapsed_s * train.p_vv + 0.5 * noise * elapsed_s**3
+            train.p_vv += noise * elapsed_s**2
+            innovation_m = way_m - train.speed_mps * elapsed_s
+            total = train.p_ss + place.variance_m2
+            gain_s, gain_v = train.p_ss / total, train.p_sv / total
+            # The filtered place lies short of the reading by the part that is not believed.
+            train.filtered_m = place.chainage_m - (1.0 - gain_s) * innovation_m
+            train.zone = place.zone
+            train.speed_mps += gain_v * innovation_m
+            train.p_vv -= gain_v * train.p_sv
+            train.p_sv *= 1.0 - gain_s
+            train.p_ss *= 1.0 - gain_s
+        train.seen_s = time_s
+        train.chainage_m = place.chainage_m
+        train.fix = Fix(
+            train.name,
+            place.zone,
+            self._map.zones[place.zone].track,
+            place.chainage_m,
+            place.variance_m2,
+            train.speed_mps,
+            train.p_vv,
+        )
+
+    def _shared_zones(self, owners: Mapping[int, int], places: Sequence[_Place]) -> set[str]:
+        """Zones in which two trains were last seen, one of which is not heard alone."""
+        seen: dict[str, int] = {}
+        for index, train in enumerate(self._trains):
+            if train.entered:
+                zone = places[owners[index]].zone if index in owners else train.zone
+                seen[zone] = seen.get(zone, 0) + 1
+        return {zone for zone, count in seen.items() if count > 1}
+
+    def _fix(
+        self, train: _Train, found: bool, shared: set[str], readings: Mapping[str, Reading]
+    ) -> Fix:
+        zone = self._map.zones[train.zone]
+        if found and train.fix is not None:
+            reading = readings[train.zone]
+            outside_m = train.fix.chainage_m - zone.end_m
+            if outside_m > 0.5 * zone.length_m:
+                return _with_reason(train.fix, self._beyond(train.zone))
+            if train.seen_s - train.regained_s < CONFIRMED_S:
+                reason = f"found again in {train.zone}, not confirmed yet"
+                return replace(
+                    train.fix, variance_m2=math.inf, speed_variance_m2ps2=math.inf, reason=reason
+                )
+            if math.isfinite(reading.variance_m2):
+                return train.fix
+        if not train.entered:
+            reason = train.unknown
+        elif train.zone in shared:
+            reason = f"two trains in {train.zone}"
+        elif (disturbed := self._disturbed_near(train)) is not None:
+            reason = f"{disturbed} disturbed"
+        elif train.zone not in readings:
+            reason = f"{zone.site} of {train.zone} does not answer"
+        elif train.chainage_m > zone.end_m + 0.5 * zone.length_m:
+            reason = f"lost {self._beyond(train.zone)}"
+        else:
+            reason = f"not heard in {train.zone}"
+        return Fix(
+            train.name,
+            train.zone,
+            zone.track,
+            train.chainage_m,
+            math.inf,
+            train.speed_mps,
+            math.inf,
+            reason,
+        )
+
+    def _beyond(self, zone: str) -> str:
+        """Name the stations that should have taken over a train past the end of a zone."""
+        sites = sorted({self._map.zones[name].site for name in self._map.following[zone]})
+        silent = f"{' and '.join(sites)} does not answer" if sites else "the line ends there"
+        return f"past the end of {zone}: {silent}"
+
+    def _disturbed_near(self, train: _Train) -> str | None:
+        """Name a disturbed zone that the train may be in, None if there is none."""
+        if train.zone in self.disturbed:
+            return train.zone
+        for name in self.disturbed:
+            zone = self._map.zones[name]
+            way_m = self._map.way_m(train.zone, train.chainage_m, name, zone.start_m)
+            if way_m is not None and abs(way_m) < 1.5 * zone.length_m:
+                return name
+        return None
+
+
+def _with_reason(fix: Fix, reason: str) -> Fix:
+    return Fix(
+        fix.train,
+        fix.zone,
+        fix.track,
+        fix.chainage_m,
+        fix.variance_m2,
+        fix.speed_mps,
+        fix.speed_variance_m2ps2,
+        reason,
+    )

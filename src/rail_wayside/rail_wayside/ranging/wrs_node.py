@@ -1,0 +1,168 @@
+"""Wayside station: sends the tone into its zones, ranges the trains that return it.
+
+Topics, for each of its zones: in ``/clock``, ``<zone>/rx``; out ``<zone>/tx``, ``<zone>/range``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from rail_msgs_py.node import Equipment
+from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.ranging.range_reading import RangeWriter
+from rail_msgs_py.ranging.signal_parameters import SignalParameters, signal_of
+from rail_msgs_py.stamps import clock_from_cdr
+from rail_msgs_py.standalone import run_node
+from rail_msgs_py.topics.ranging import RANGE, WRS_RX, WRS_TX
+from rail_msgs_py.topics.tick import CLOCK
+from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence, silent_stamp_ns
+from rail_signals.ranging.signal import modulate
+
+from .ranging_station import NOTHING_HEARD, RangingStation
+
+
+@dataclass(frozen=True)
+class WrsParameters(SignalParameters):
+    """Parameters of a wayside station."""
+
+    zones: tuple[str, ...] = parameter(("zone1",), "zones it looks into, an antenna each")
+    downlink_channels: tuple[int, ...] = parameter((1,), "channel it sends on, per zone", low=1)
+    uplink_channels: tuple[int, ...] = parameter((2,), "channel it hears on, per zone", low=1)
+    downlink_carriers_hz: tuple[float, ...] = parameter(
+        (2.4e9,), "carrier of the downlink channel, per zone", unit="Hz", low=0.0
+    )
+    power_dbm: float = parameter(-10.0, "transmit power", unit="dBm", low=-100.0, high=60.0)
+    comparator: str = parameter("quadrature", "phase comparator: and, quadrature or two_tone")
+    delay_s: float = parameter(
+        1e-6, "calibrated delay of the transponders", unit="s", low=0.0, high=1e-3
+    )
+    noise_dbm: float = parameter(
+        -100.0, "receiver noise expected in the bandwidth", unit="dBm", low=-150.0, high=0.0
+    )
+
+
+@dataclass
+class _Antenna:
+    """One zone's antenna: what it sends, and where its readings go."""
+
+    tone: RepeatedBlock
+    quiet: RepeatedBlock
+    send: Callable[[bytes], None]
+    publish: Callable[[bytes], None]
+    writer: RangeWriter
+    uplink_channel: int
+    disturbance: str = ""
+
+
+class WrsNode(Equipment):
+    """Wayside station as a managed node."""
+
+    def __init__(
+        self,
+        name: str = "wrs1",
+        *,
+        namespace: str = "/wayside",
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: bool = True,
+    ) -> None:
+        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
+        self._p = declare(self, WrsParameters)
+        self._check_parameters()
+        signal = signal_of(self._p)
+        self._station = RangingStation(
+            signal,
+            self._p.comparator,  # type: ignore[arg-type]
+            self._p.delay_s,
+            noise_mw=10.0 ** (self._p.noise_dbm / 10.0),
+        )
+        tone = modulate(signal, np.zeros(len(signal.tones_hz)))
+        samples = tone[None, :] * 10.0 ** (self._p.power_dbm / 20.0)
+        low_m, high_m = self._station.interval_m
+        self._antennas: list[_Antenna] = []
+        for zone, channel, uplink_channel, carrier_hz in zip(
+            self._p.zones,
+            self._p.downlink_channels,
+            self._p.uplink_channels,
+            self._p.downlink_carriers_hz,
+            strict=True,
+        ):
+            parts = {"site": name, "zone": zone}
+            radio = (signal.sample_rate_hz, carrier_hz, channel)
+            antenna = _Antenna(
+                RepeatedBlock(Waveform(0, *radio, samples)),
+                RepeatedBlock(silence(0, *radio)),
+                self.stream_out(WRS_TX, **parts),
+                self.stream_out(RANGE, **parts),
+                RangeWriter(zone, low_m, high_m),
+                uplink_channel,
+            )
+            self._antennas.append(antenna)
+            self.stream_in(
+                WRS_RX,
+                lambda raw, zone=zone, antenna=antenna: self._receive(zone, antenna, raw),
+                **parts,
+            )
+        self.stream_in(CLOCK, self._on_clock)
+        self.announce_when_connected()
+
+    def _check_parameters(self) -> None:
+        counts = {
+            len(self._p.zones),
+            len(self._p.downlink_channels),
+            len(self._p.uplink_channels),
+            len(self._p.downlink_carriers_hz),
+        }
+        if len(counts) != 1 or 0 in counts:
+            raise ParameterError(
+                f"{self.get_name()}: zones: {self._p.zones}: every zone needs one downlink "
+                "channel, one uplink channel and one carrier"
+            )
+        if self._p.comparator not in ("and", "quadrature", "two_tone"):
+            raise ParameterError(
+                f"{self.get_name()}: comparator: {self._p.comparator}: and, quadrature or two_tone"
+            )
+
+    def _on_clock(self, raw: bytes) -> None:
+        stamp_ns = clock_from_cdr(raw)
+        for antenna in self._antennas:
+            block = antenna.tone if self.switched_on else antenna.quiet
+            antenna.send(block.at(stamp_ns))
+
+    def _receive(self, zone: str, antenna: _Antenna, raw: bytes) -> None:
+        stamp_ns = silent_stamp_ns(raw)
+        if stamp_ns is not None:
+            reading = NOTHING_HEARD
+        else:
+            block = Waveform.from_cdr(raw)
+            stamp_ns = block.stamp_ns
+            reading = self._station.read(block.samples[0]) if self.switched_on else NOTHING_HEARD
+        antenna.publish(antenna.writer.write(stamp_ns, reading.range_m, reading.variance_m2))
+        if reading.disturbance != antenna.disturbance:
+            antenna.disturbance = reading.disturbance
+            self._report_disturbance(zone, antenna, stamp_ns)
+
+    def _report_disturbance(self, zone: str, antenna: _Antenna, stamp_ns: int) -> None:
+        disturbance = antenna.disturbance
+        reason = disturbance.split(":")[0]
+        self.report(
+            DiagnosticStatus.WARN if disturbance else DiagnosticStatus.OK,
+            zone,
+            f"{reason} on CH{antenna.uplink_channel}" if reason else "undisturbed",
+            values=[("detail", disturbance)],
+            stamp_ns=stamp_ns,
+        )
+
+
+def main() -> None:
+    """Run a wayside station on its own."""
+    run_node(WrsNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,288 @@
+"""Moving block: movement authorities from where trains surely are (IEEE 1474.1).
+
+Trains on a track keep their order, as none can pass another. So the end of a train's authority
+is set by its neighbour ahead alone, by the end of the track, and by what is where no train
+should be:
+
+======================== ====================================================================
+neighbour, same way      its worst rear, less the margin
+neighbour, oncoming      the furthest it was ever let or may be, less the margin: who was
+                         given a stretch first keeps it, and neither is let into the other's
+end of the track         less the end margin
+stray position           where a train reports, or is ranged, off its own track
+======================== ====================================================================
+
+A train that may be further ahead than it reports (see `rail_wayside.train_radio.train_bounds`) is
+told an end
+that is nearer by as much. An end that comes back towards the train is said to be shortened; that
+happens only if something got worse.
+
+All times are those of one clock; a difference of clocks is part of the uncertainty of a report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import inf
+
+from rail_msgs_py.train_radio.movement_authority import FASTEST_MPS, FURTHEST_M, LONGEST_S
+from rail_msgs_py.train_radio.train_report import LocationReport
+
+from .authority import Authority, to_telegram
+from .speed_profile import Segment
+from .train_bounds import TrainBounds, TrainStart, Trouble
+from .train_order import TrainOrder, inverted
+
+__all__ = ["Authority", "MovingBlock", "Segment", "TrainStart", "Trouble", "to_telegram"]
+
+
+class MovingBlock:
+    """Movement authorities for every train of a control area.
+
+    Parameters
+    ----------
+    segments : iterable of Segment
+    trains : iterable of TrainStart
+        Those at the same place in the order in which they go, the first ahead.
+    margin_m : float
+        Kept behind a train and between oncoming ones; no train rolls back further.
+    end_margin_m : float
+        Kept before the end of a track.
+    overspeed_mps : float
+        By how much a train may exceed the highest limit of its track at most.
+    sigmas : float
+        A range is believed within that many standard deviations.
+    validity_s : float
+        Of an authority.
+    standing_mps : float
+        A train that reports no more than that stands; what it still rolls, the margin covers.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range, a number is given twice or a segment is not known.
+
+    Examples
+    --------
+    >>> track = Segment(1, "up", 5000.0, ((0.0, 20.0),))
+    >>> trains = [TrainStart(7, "T7", 150.0, 1, 1, 200.0), TrainStart(8, "T8", 100.0, 1, 1, 900.0)]
+    >>> zone = MovingBlock([track], trains, margin_m=10.0)
+    >>> zone.report(8, 5.0, LocationReport(8, 1, 1000.0, 1, 20.0, 3.0, 100.0, True, True))
+    True
+    >>> authority = zone.authority(7, 5.0)
+    >>> authority.end_m, authority.cause
+    (887.0, 'rear of T8')
+    """
+
+    def __init__(
+        self,
+        segments: Iterable[Segment],
+        trains: Iterable[TrainStart] = (),
+        *,
+        margin_m: float = 10.0,
+        end_margin_m: float = 20.0,
+        overspeed_mps: float = 3.0,
+        sigmas: float = 6.0,
+        validity_s: float = 4.0,
+        standing_mps: float = 0.1,
+    ) -> None:
+        for name, value, most in (
+            ("margin_m", margin_m, FURTHEST_M),
+            ("end_margin_m", end_margin_m, FURTHEST_M),
+            ("overspeed_mps", overspeed_mps, FASTEST_MPS),
+            ("sigmas", sigmas, 100.0),
+            ("validity_s", validity_s, LONGEST_S),
+            ("standing_mps", standing_mps, 1.0),
+        ):
+            if not 0.0 <= value <= most:
+                raise ValueError(f"{name}: {value} is not from 0 to {most:g}")
+        self._margin_m, self._end_margin_m = margin_m, end_margin_m
+        self._overspeed_mps, self._sigmas = overspeed_mps, sigmas
+        self._validity_s, self._standing_mps = validity_s, standing_mps
+        self._lines: dict[int, TrainOrder] = {}
+        for segment in segments:
+            if segment.number in self._lines:
+                raise ValueError(f"segments: number {segment.number} is given twice")
+            self._lines[segment.number] = TrainOrder(segment)
+        self._trains: dict[int, TrainBounds] = {}
+        for train in trains:
+            self.add(train)
+
+    @property
+    def trains(self) -> tuple[int, ...]:
+        """Numbers of the trains in service."""
+        return tuple(self._trains)
+
+    def add(self, start: TrainStart) -> None:
+        """Take a train into service.
+
+        Raises
+        ------
+        ValueError
+            If its number is in use or its segment is not known.
+        """
+        if start.number in self._trains:
+            raise ValueError(f"number: train {start.number} is in service already")
+        if start.segment not in self._lines:
+            raise ValueError(f"segment: {start.segment} of train {start.number} is not known")
+        line = self._lines[start.segment]
+        bounds = TrainBounds(
+            start,
+            fastest_mps=line.segment.fastest_mps + self._overspeed_mps,
+            roll_back_m=self._margin_m,
+            sigmas=self._sigmas,
+            standing_mps=self._standing_mps,
+        )
+        self._trains[start.number] = bounds
+        if bounds.placed:
+            line.insert(bounds)
+
+    def remove(self, train: int) -> None:
+        """Forget a train that has left."""
+        bounds = self._trains.pop(train, None)
+        if bounds is None:
+            return
+        self._lines[bounds.start.segment].remove(bounds)
+        self._forget_strays(train, False)
+        self._forget_strays(train, True)
+
+    def report(self, train: int, time_s: float, report: LocationReport) -> bool:
+        """Take the location report of a train, true at `time_s`.
+
+        Returns whether it was taken: from a train in service, its own, newer than the last. A
+        train that is whole and proven past the end of the track is removed.
+        """
+        bounds = self._trains.get(train)
+        if bounds is None or report.train != train:
+            return False
+        strayed, placed = bounds.strayed, bounds.placed
+        if not bounds.report(time_s, report):
+            return False
+        if bounds.strayed and not bounds.invalid:
+            self._forget_strays(train, False)
+            if (line := self._lines.get(report.segment)) is not None:
+                ends = (report.rear_m, report.front_m)
+                line.strays[train, False] = (bounds.start.name, min(ends), max(ends))
+            return True
+        if strayed and not bounds.strayed:
+            self._forget_strays(train, False)
+        line = self._lines[bounds.start.segment]
+        if bounds.placed and not placed:
+            line.insert(bounds)
+        if bounds.rear_m > line.end_m(bounds.direction) and not (bounds.leap or bounds.clash):
+            self.remove(train)
+        return True
+
+    def ranged(
+        self, train: int, time_s: float, segment: int, position_m: float, sigma_m: float
+    ) -> bool:
+        """Take the chainage of a train's front by phase ranging, with its standard deviation.
+
+        An infinite deviation, or a chainage that is none, says nothing. Returns whether it was
+        taken.
+
+        Raises
+        ------
+        ValueError
+            If the deviation is negative or NaN.
+        """
+        if not sigma_m >= 0.0:
+            raise ValueError(f"sigma_m: {sigma_m} is not a standard deviation")
+        bounds = self._trains.get(train)
+        if bounds is None or sigma_m == inf or not -FURTHEST_M <= position_m <= FURTHEST_M:
+            return False
+        if segment != bounds.start.segment:
+            line = self._lines.get(segment)
+            if line is None or time_s <= bounds.ranged_s:
+                return False
+            bounds.ranged_s = time_s
+            self._forget_strays(train, True)
+            half_m = self._sigmas * sigma_m + bounds.length_m
+            line.strays[train, True] = (
+                bounds.start.name,
+                position_m - half_m,
+                position_m + half_m,
+            )
+            return True
+        if not bounds.ranged(time_s, position_m, sigma_m):
+            return False
+        self._forget_strays(train, True)
+        return True
+
+    def occupied(self, train: int, time_s: float) -> tuple[float, float] | None:
+        """Worst rear and worst front [m, chainage] at a time, None if not known."""
+        bounds = self._trains.get(train)
+        if bounds is None or not bounds.placed:
+            return None
+        return bounds.direction * bounds.rear_m, bounds.direction * bounds.front_at_m(time_s)
+
+    def authority(self, train: int, time_s: float) -> Authority | None:
+        """Issue the authority of a train at a time; it occupies what it is given.
+
+        None if it is not in service, its place is not known, or it reports another track.
+        """
+        bounds = self._trains.get(train)
+        if bounds is None or not bounds.placed or bounds.strayed:
+            return None
+        number, direction = bounds.start.segment, bounds.direction
+        line = self._lines[number]
+        end_m = line.end_m(direction) - self._end_margin_m
+        cause = "end of the track"
+        ahead = bounds.above if direction > 0 else bounds.below
+        if ahead is not None:
+            before_m = ahead.rear_m
+            if oncoming := ahead.direction != direction:
+                before_m = -ahead.reserve_m
+            if before_m - self._margin_m < end_m:
+                end_m = before_m - self._margin_m
+                cause = ahead.as_oncoming if oncoming else ahead.as_leader
+        if line.strays:
+            before = line.before_strays(bounds, self._margin_m)
+            if before is not None and before[0] < end_m:
+                end_m, cause = before
+        stop = inverted(bounds)
+        end_m -= bounds.lead_m
+        if stop:
+            end_m, cause = min(end_m, bounds.rear_m), Trouble.ORDER.value
+        if (same := bounds.reissue(time_s, end_m, stop, cause)) is not None:
+            return same
+        shortened = bounds.issue(time_s, end_m, self._validity_s)
+        limit_mps, steps = line.limits.ahead(direction, bounds.rear_m, bounds.front_m, end_m)
+        authority = Authority(
+            train,
+            number,
+            direction,
+            direction * end_m,
+            limit_mps,
+            steps,
+            self._validity_s,
+            stop,
+            shortened,
+            cause,
+        )
+        bounds.granted = bounds.rear_m, bounds.front_m, authority
+        return authority
+
+    def troubles(self, train: int) -> tuple[Trouble, ...]:
+        """What does not fit about a train."""
+        bounds = self._trains.get(train)
+        if bounds is None:
+            return ()
+        ranged_off = any((train, True) in line.strays for line in self._lines.values())
+        found = (
+            (bounds.invalid, Trouble.INVALID),
+            (bounds.no_integrity, Trouble.INTEGRITY),
+            (bounds.strayed, Trouble.SEGMENT),
+            (bounds.leap, Trouble.LEAP),
+            (bounds.clash, Trouble.RANGE),
+            (ranged_off, Trouble.RANGE_SEGMENT),
+            (bounds.longer, Trouble.LENGTH),
+            (bounds.overrun, Trouble.OVERRUN),
+            (inverted(bounds), Trouble.ORDER),
+        )
+        return tuple(trouble for is_so, trouble in found if is_so)
+
+    def _forget_strays(self, train: int, ranged: bool) -> None:
+        for line in self._lines.values():
+            if line.strays:
+                line.strays.pop((train, ranged), None)

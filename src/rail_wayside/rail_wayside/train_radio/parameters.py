@@ -1,0 +1,110 @@
+"""What a zone controller needs to give authorities, as node parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.train_radio.train_channel import controller_end
+
+from .authority_issuer import AuthorityDesk
+from .moving_block import MovingBlock
+from .speed_profile import Segment
+from .train_bounds import TrainStart
+
+
+@dataclass(frozen=True)
+class AuthorityParameters:
+    """Parameters of movement authorities; arrays over the trains unless said otherwise."""
+
+    trains: tuple[str, ...] = parameter((), "trains, in the order they enter the line")
+    bases: tuple[str, ...] = parameter(
+        (), "base stations of the train radio; without any, no authorities are given"
+    )
+    backbone: bool = parameter(
+        False, "whether the backbone brings their telegrams, instead of they themselves"
+    )
+    segments: tuple[str, ...] = parameter((), "tracks, numbered from 0 in telegrams")
+    segment_lengths_m: tuple[float, ...] = parameter((), "length of each track", unit="m")
+    limit_counts: tuple[int, ...] = parameter((), "speed limits of each track", low=1)
+    limit_from_m: tuple[float, ...] = parameter(
+        (), "where each limit begins, one track after the other", unit="m"
+    )
+    limits_mps: tuple[float, ...] = parameter((), "each limit", unit="m/s", low=0.0)
+    train_numbers: tuple[int, ...] = parameter((), "number in telegrams", low=1, high=0xEFFF)
+    train_lengths_m: tuple[float, ...] = parameter((), "length", unit="m")
+    train_segments: tuple[int, ...] = parameter((), "track", low=0)
+    train_starts_m: tuple[float, ...] = parameter((), "front at first", unit="m")
+    leaves_at_m: tuple[float, ...] = parameter(
+        (), "where it passes to the next control area; 0 = nowhere", unit="m", low=0.0
+    )
+    placed_m: float = parameter(1.0, "how well the fronts are known at first", unit="m", low=0.0)
+    margin_m: float = parameter(10.0, "kept behind a train", unit="m", low=0.0, high=1e4)
+    end_margin_m: float = parameter(
+        5.0, "kept before the end of a track", unit="m", low=0.0, high=1e4
+    )
+    validity_s: float = parameter(3.0, "of an authority", unit="s", low=0.1, high=600.0)
+    fix_sigmas: float = parameter(4.0, "half-width of ranges told to trains", low=1.0, high=20.0)
+    secret: str = parameter("00" * 16, "of the safe channels, in hexadecimal digits")
+    seed: int = parameter(0, "of the nonces of the safe channels", low=0)
+    tick_s: float = parameter(0.25, "time of a tick", unit="s", low=0.01, high=1.0)
+
+
+def desk_of(p: AuthorityParameters) -> AuthorityDesk | None:
+    """Desk of the parameters, None without base stations.
+
+    Raises
+    ------
+    ParameterError
+        If they do not fit together.
+    """
+    if not p.bases:
+        return None
+    per_train = ("train_numbers", "train_lengths_m", "train_segments", "train_starts_m")
+    for name in (*per_train, "leaves_at_m"):
+        if len(getattr(p, name)) != len(p.trains):
+            raise ParameterError(
+                f"zone_controller: {name}: {len(getattr(p, name))} entries for"
+                f" {len(p.trains)} trains"
+            )
+    if not len(p.segments) == len(p.segment_lengths_m) == len(p.limit_counts):
+        raise ParameterError(
+            f"zone_controller: segment_lengths_m: {p.segment_lengths_m}: one, and a count of"
+            f" limits, for each of {len(p.segments)} tracks"
+        )
+    if not len(p.limit_from_m) == len(p.limits_mps) == sum(p.limit_counts):
+        raise ParameterError(
+            f"zone_controller: limits_mps: {len(p.limits_mps)} for {sum(p.limit_counts)} limits"
+        )
+    try:
+        return _desk(p)
+    except ValueError as error:
+        raise ParameterError(f"zone_controller: {error}") from None
+
+
+def _desk(p: AuthorityParameters) -> AuthorityDesk:
+    limits = list(zip(p.limit_from_m, p.limits_mps, strict=True))
+    segments = []
+    for number, (name, length_m, count) in enumerate(
+        zip(p.segments, p.segment_lengths_m, p.limit_counts, strict=True)
+    ):
+        segments.append(Segment(number, name, length_m, tuple(limits[:count])))
+        limits = limits[count:]
+    rows = zip(
+        *(p.train_numbers, p.trains, p.train_lengths_m, p.train_segments, p.train_starts_m),
+        strict=True,
+    )
+    starts = [
+        TrainStart(number, name, length_m, 1, segment, start_m, p.placed_m)
+        for number, name, length_m, segment, start_m in rows
+    ]
+    block = MovingBlock(
+        segments,
+        starts,
+        margin_m=p.margin_m,
+        end_margin_m=p.end_margin_m,
+        validity_s=p.validity_s,
+    )
+    channels = {n: controller_end(p.secret, p.seed, n, p.tick_s) for n in p.train_numbers}
+    leaves = {n: at for n, at in zip(p.train_numbers, p.leaves_at_m, strict=True) if at > 0.0}
+    return AuthorityDesk(block, channels, p.bases, leaves_at_m=leaves, fix_sigmas=p.fix_sigmas)

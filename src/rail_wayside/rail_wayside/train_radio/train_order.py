@@ -1,0 +1,70 @@
+"""Trains of one track in the order of their chainages, which none of them can change."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from itertools import pairwise
+
+from .speed_profile import AuthorityLimits, Segment
+from .train_bounds import TrainBounds
+
+
+class TrainOrder:
+    """Trains of one track.
+
+    The order comes from the places at which trains enter service and is kept from then on; a
+    train surely past its neighbour is not sorted anew but an inversion, which is a danger.
+
+    Parameters
+    ----------
+    segment : Segment
+    """
+
+    def __init__(self, segment: Segment) -> None:
+        self.segment = segment
+        self.limits = AuthorityLimits(segment)
+        #: Places (chainages) of trains that should not be here: name, from, to; by (train, ranged).
+        self.strays: dict[tuple[int, bool], tuple[str, float, float]] = {}
+        self._order: list[TrainBounds] = []
+
+    def end_m(self, direction: int) -> float:
+        """End of the track along a direction (direction times chainage)."""
+        return self.segment.length_m if direction > 0 else 0.0
+
+    def insert(self, bounds: TrainBounds) -> None:
+        """Give a train its place in the order; among equals behind those already there."""
+        centres = [sum(other.centre_m) for other in self._order]
+        find = bisect_left if bounds.direction > 0 else bisect_right
+        self._order.insert(find(centres, sum(bounds.centre_m)), bounds)
+        self._link()
+
+    def remove(self, bounds: TrainBounds) -> None:
+        """Take a train out."""
+        if bounds in self._order:
+            self._order.remove(bounds)
+            self._link()
+
+    def _link(self) -> None:
+        for bounds in self._order:
+            bounds.below = bounds.above = None
+        for lower, upper in pairwise(self._order):
+            lower.above, upper.below = upper, lower
+
+    def before_strays(self, bounds: TrainBounds, margin_m: float) -> tuple[float, str] | None:
+        """Nearest end, along its direction, before the strays that a train has not passed."""
+        nearest: tuple[float, str] | None = None
+        for (train, _), (name, low_m, high_m) in self.strays.items():
+            near_m, far_m = (low_m, high_m) if bounds.direction > 0 else (-high_m, -low_m)
+            if train == bounds.start.number or far_m <= bounds.rear_m:
+                continue
+            if nearest is None or near_m - margin_m < nearest[0]:
+                nearest = near_m - margin_m, f"stray {name}"
+        return nearest
+
+
+def inverted(bounds: TrainBounds) -> bool:
+    """Whether a train is surely past one of its neighbours."""
+    below, above = bounds.below, bounds.above
+    return (below is not None and below.centre_m[0] > bounds.centre_m[1]) or (
+        above is not None and bounds.centre_m[0] > above.centre_m[1]
+    )

@@ -1,0 +1,1 @@
+"""Positions from the Doppler shifts of reference stations."""

@@ -1,0 +1,1 @@
+"""The railway line: alignments, tracks, the network they make, files that describe them."""

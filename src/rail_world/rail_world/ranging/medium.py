@@ -1,0 +1,322 @@
+"""The radio medium: everything between a transmitting and a receiving antenna.
+
+Free-space loss at 1 m, then the path-loss exponent; parabolic antenna patterns; the exact
+fractional delay of the envelope and the carrier phase of the same path; Doppler shift and
+oscillator offsets; the sum of all transmitters in reach on the channel; thermal noise.
+
+No station reaches past two zones (Jeong et al., section 2.5): beyond ``reach_m`` of a
+station antenna a link does not exist, in either direction.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
+from rail_signals.delay import repetition, through_paths
+from rail_signals.phasors import cis
+
+from .description import AntennaPattern, RadioDescription
+from .noise import NoiseSource
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+THERMAL_NOISE_DBM_PER_HZ = -173.975  # k T at 290 K
+_MIN_DISTANCE_M = 1.0
+
+
+@dataclass(frozen=True)
+class TrainAntennas:
+    """Where the train antennas are: arrays over the trains in the order of the description.
+
+    ``position_m`` and ``velocity_mps`` [train, 3]; ``heading_rad`` [train] of the track
+    towards increasing chainage, anticlockwise from east.
+    """
+
+    position_m: FloatArray
+    velocity_mps: FloatArray
+    heading_rad: FloatArray
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Geometry of one tick between all station and train antennas, arrays [station, train]."""
+
+    distance_m: FloatArray
+    closing_speed_mps: FloatArray
+    gain_db: FloatArray
+    in_reach: NDArray[np.bool_]
+    train_position_m: FloatArray
+    train_axis: FloatArray
+
+
+@dataclass(frozen=True)
+class _Sent:
+    """A block that an antenna sends, its mean power and the transform of its period."""
+
+    samples: ComplexArray
+    power_mw: float
+    spectrum: ComplexArray
+
+
+@dataclass(frozen=True)
+class Reception:
+    """What one antenna receives on one channel.
+
+    ``samples`` in sqrt(mW); ``signal_mw`` of the strongest source, which is the pair
+    ``source`` (station antenna, train); ``noise_mw`` of thermal noise and jammers.
+    """
+
+    samples: NDArray[np.complex64]
+    signal_mw: float
+    noise_mw: float
+    source: tuple[int, int]
+
+    @property
+    def snr(self) -> float:
+        """Carrier-to-noise ratio per sample, linear."""
+        return self.signal_mw / self.noise_mw
+
+
+def pattern_gain_db(pattern: AntennaPattern, cos_angle: FloatArray) -> FloatArray:
+    """Gain off the axis: ``G - min(12 (angle / beamwidth)^2, front-to-back)``."""
+    angle_deg = np.degrees(np.arccos(np.clip(cos_angle, -1.0, 1.0)))
+    roll_off_db = 12.0 * (angle_deg / pattern.beamwidth_deg) ** 2
+    return pattern.gain_dbi - np.minimum(roll_off_db, pattern.front_to_back_db)
+
+
+class RadioMedium:
+    """Propagates the blocks of one tick.
+
+    Parameters
+    ----------
+    description : RadioDescription
+    seed : int
+        Of the noise and the oscillators.
+    """
+
+    def __init__(self, description: RadioDescription, seed: int) -> None:
+        self.description = description
+        stations = description.stations
+        self._positions_m = np.array([a.position_m for a in stations]).reshape(-1, 3)
+        boresight = np.array([a.boresight for a in stations]).reshape(-1, 3)
+        self._boresight = boresight / np.linalg.norm(boresight, axis=1, keepdims=True)
+        self._reach_m = np.array([a.reach_m for a in stations])
+        self._downlink = np.array([a.downlink_channel for a in stations], dtype=np.int64)
+        self._uplink = np.array([a.uplink_channel for a in stations], dtype=np.int64)
+        self._sites = [a.site for a in stations]
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 0])))
+        sigma = description.oscillator_ppm * 1e-6
+        # A site has one oscillator for all its antennas.
+        by_site = {site: sigma * rng.standard_normal() for site in dict.fromkeys(self._sites)}
+        self._station_offset = np.array([by_site[site] for site in self._sites])
+        self._train_offset = sigma * rng.standard_normal(len(description.trains))
+        # By channel number, so that arrays of channels can index them.
+        self._carrier_hz = np.zeros(1 + max(description.carriers_hz, default=0))
+        for channel, carrier_hz in description.carriers_hz.items():
+            self._carrier_hz[channel] = carrier_hz
+        with np.errstate(divide="ignore"):
+            self._loss_at_1m_db = 20.0 * np.log10(
+                4.0 * np.pi * self._carrier_hz / SPEED_OF_LIGHT_M_PER_S
+            )
+        self.noise_mw = 10.0 ** (
+            (THERMAL_NOISE_DBM_PER_HZ + description.noise_figure_db) / 10.0
+        ) * (description.sample_rate_hz)
+        self._floor_mw = self.noise_mw * 10.0 ** (description.sensitivity_db / 10.0)
+        self._noise = NoiseSource(seed, description.samples)
+        self._known: dict[tuple[bool, int], _Sent] = {}
+
+    def paths(self, trains: TrainAntennas) -> Paths:
+        """Distances, closing speeds and antenna gains of one tick."""
+        line = trains.position_m[None, :, :] - self._positions_m[:, None, :]
+        distance_m = np.maximum(np.sqrt(np.einsum("stk,stk->st", line, line)), _MIN_DISTANCE_M)
+        unit = line / distance_m[..., None]
+        station_cos = np.einsum("stk,sk->st", unit, self._boresight)
+        # The train's antenna looks back to the station of its zone.
+        heading = trains.heading_rad
+        axis = -np.stack((np.cos(heading), np.sin(heading), np.zeros_like(heading)), axis=1)
+        train_cos = -np.einsum("stk,tk->st", unit, axis)
+        radio = self.description
+        gain_db = (
+            pattern_gain_db(radio.station_pattern, station_cos)
+            + pattern_gain_db(radio.train_pattern, train_cos)
+            - 10.0 * radio.path_loss_exponent * np.log10(distance_m)
+        )
+        closing = -np.einsum("stk,tk->st", unit, trains.velocity_mps)
+        in_reach = distance_m <= self._reach_m[:, None]
+        return Paths(distance_m, closing, gain_db, in_reach, trains.position_m, axis)
+
+    def dead_stations(self, time_s: float) -> set[int]:
+        """Indices of station antennas that are dead at ``time_s``."""
+        dead = {
+            fault.station
+            for fault in self.description.faults
+            if fault.kind == "dead_station" and fault.from_s <= time_s < fault.to_s
+        }
+        return {index for index, site in enumerate(self._sites) if site in dead}
+
+    def downlink(
+        self, tick: int, time_s: float, paths: Paths, blocks: dict[int, ComplexArray]
+    ) -> dict[tuple[int, int], Reception]:
+        """What each train hears on each channel.
+
+        Parameters
+        ----------
+        tick, time_s : int, float
+            Number and simulated time of the tick.
+        paths : Paths
+        blocks : dict
+            Index of the station antenna -> samples sent, sqrt(mW); silent ones are missing.
+            An array that is passed again is taken to hold the same samples.
+
+        Returns
+        -------
+        dict of (train index, channel) -> Reception; pairs that hear nothing are missing.
+        """
+        sending = self._alive(time_s)
+        sending[[station for station in range(len(sending)) if station not in blocks]] = False
+        links = np.nonzero(paths.in_reach & sending[:, None])
+        return self._receive(tick, time_s, paths, links, blocks, self._downlink[links[0]])
+
+    def uplink(
+        self,
+        tick: int,
+        time_s: float,
+        paths: Paths,
+        blocks: dict[int, tuple[int, ComplexArray]],
+    ) -> dict[tuple[int, int], Reception]:
+        """What each station antenna hears on its uplink channel.
+
+        ``blocks``: train index -> (channel, samples sent).
+        Returns a dict of (station antenna index, channel) -> Reception.
+        """
+        channel = np.zeros(paths.in_reach.shape[1], dtype=np.int64)
+        for train, (on, _) in blocks.items():
+            channel[train] = on
+        hears = (self._uplink[:, None] == channel) & self._alive(time_s)[:, None]
+        links = np.nonzero(paths.in_reach & hears)
+        sent = {train: samples for train, (_, samples) in blocks.items()}
+        return self._receive(tick, time_s, paths, links, sent, self._uplink[links[0]], uplink=True)
+
+    def _alive(self, time_s: float) -> NDArray[np.bool_]:
+        """Which station antennas are not dead."""
+        alive = np.ones(len(self._sites), dtype=np.bool_)
+        alive[list(self.dead_stations(time_s))] = False
+        return alive
+
+    def _receive(
+        self,
+        tick: int,
+        time_s: float,
+        paths: Paths,
+        links: tuple[NDArray[np.intp], ...],
+        blocks: dict[int, ComplexArray],
+        channel: NDArray[np.int64],
+        *,
+        uplink: bool = False,
+    ) -> dict[tuple[int, int], Reception]:
+        """Carry ``blocks`` over the links (station, train), each on its channel; add noise."""
+        received: dict[tuple[int, int], Reception] = {}
+        if not blocks or not links[0].size:
+            return received
+        radio = self.description
+        sent_by = links[1 if uplink else 0].tolist()
+        sent = [self._sent(uplink, sender, blocks[sender]) for sender in sent_by]
+        gain_db = paths.gain_db[links] - self._loss_at_1m_db[channel]
+        power_mw = np.array([block.power_mw for block in sent]) * 10.0 ** (gain_db / 10.0)
+        audible = np.flatnonzero(power_mw >= self._floor_mw)
+        if not audible.size:
+            return received
+        s, t = links[0][audible], links[1][audible]
+        power_mw, channel = power_mw[audible], channel[audible]
+        carrier_hz = self._carrier_hz[channel]
+        delay_s = paths.distance_m[s, t] / SPEED_OF_LIGHT_M_PER_S
+        doppler_hz = carrier_hz * paths.closing_speed_mps[s, t] / SPEED_OF_LIGHT_M_PER_S
+        offsets = self._station_offset[s] - self._train_offset[t]
+        carrier_phase = -2.0 * np.pi * np.mod(carrier_hz * delay_s, 1.0)
+        arrived = through_paths(
+            _stacked([sent[link].spectrum for link in audible.tolist()]),
+            radio.samples,
+            delay_s=delay_s,
+            shift_hz=doppler_hz + carrier_hz * (-offsets if uplink else offsets),
+            gain=10.0 ** (gain_db[audible] / 20.0) * cis(carrier_phase),
+            sample_rate_hz=radio.sample_rate_hz,
+        )
+        heard: dict[tuple[int, int], list[int]] = {}
+        receivers = (s if uplink else t).tolist()
+        for row, port in enumerate(zip(receivers, channel.tolist(), strict=True)):
+            heard.setdefault(port, []).append(row)
+        ports = [port[0] * 128 + port[1] for port in heard]
+        noise = self._noise.blocks(2 if uplink else 1, ports, tick)
+        for (port, rows), total in zip(heard.items(), noise, strict=True):
+            noise_mw = self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
+            total *= np.float32(np.sqrt(noise_mw))
+            for row in rows:
+                total += arrived[row]
+            strongest = max(rows, key=lambda row: float(power_mw[row]))
+            received[port] = Reception(
+                total,
+                float(power_mw[strongest]),
+                noise_mw,
+                (int(s[strongest]), int(t[strongest])),
+            )
+        return received
+
+    def _sent(self, uplink: bool, sender: int, samples: ComplexArray) -> _Sent:
+        """Power and spectrum of a block; a block that is sent again is not transformed again."""
+        known = self._known.get((uplink, sender))
+        if known is None or known.samples is not samples:
+            if len(samples) != self.description.samples:
+                raise ValueError(
+                    f"a block of {len(samples)} samples, not {self.description.samples}"
+                )
+            period = repetition(samples, len(known.spectrum) if known else 0)
+            one = samples[:period]
+            power_mw = float(np.vdot(one, one).real) / period
+            known = _Sent(samples, power_mw, np.fft.fft(one))
+            self._known[uplink, sender] = known
+        return known
+
+    def _jamming_mw(
+        self, time_s: float, port: tuple[int, int], paths: Paths, *, uplink: bool
+    ) -> float:
+        """Noise power that the jammers on the channel bring into a receiving antenna."""
+        radio = self.description
+        total = 0.0
+        for fault in radio.faults:
+            if fault.kind != "jam" or not fault.from_s <= time_s < fault.to_s:
+                continue
+            if fault.channel != port[1]:
+                continue
+            if uplink:
+                here, axis = self._positions_m[port[0]], self._boresight[port[0]]
+                pattern = radio.station_pattern
+            else:
+                here, axis = paths.train_position_m[port[0]], paths.train_axis[port[0]]
+                pattern = radio.train_pattern
+            line = np.asarray(fault.position_m) - here
+            distance_m = max(float(np.sqrt(line @ line)), _MIN_DISTANCE_M)
+            gain_db = float(pattern_gain_db(pattern, line @ axis / distance_m))
+            loss_db = float(self._loss_at_1m_db[port[1]]) + 10.0 * (
+                radio.path_loss_exponent * np.log10(distance_m)
+            )
+            total += 10.0 ** ((fault.power_dbm + gain_db - loss_db) / 10.0)
+        return total
+
+
+def _stacked(spectra: list[ComplexArray]) -> ComplexArray:
+    """Transforms [path, period] of a common period: a shorter one leaves bins empty."""
+    periods = {len(spectrum) for spectrum in spectra}
+    if len(periods) == 1:
+        return np.array(spectra)
+    period = math.lcm(*periods)
+    stacked = np.zeros((len(spectra), period), dtype=np.complex128)
+    for row, spectrum in zip(stacked, spectra, strict=True):
+        repeats = period // len(spectrum)
+        row[::repeats] = spectrum * repeats
+    return stacked

@@ -1,0 +1,138 @@
+"""The validated description of the rails as a medium: track circuits, levels, noise, faults."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from rail_world.line.description_base import Chainage, Description, Name, Number, whole_samples
+
+Decibels = Annotated[Number, Field(ge=0.0, le=200.0)]
+Volts = Annotated[Number, Field(ge=0.0, le=1e4)]
+Seconds = Annotated[Number, Field(ge=0.0, le=1e9)]
+
+
+class TrackCircuit(Description):
+    """One block of rails: its transmitter stands at ``end_m``, its receiver at ``start_m``."""
+
+    name: Name
+    track: Name
+    start_m: Chainage = Field(description="entry end [m]")
+    end_m: Chainage = Field(description="exit end, that trains run towards [m]")
+    carrier_hz: Number = Field(gt=0.0, le=1e5, description="carrier of the transmitter [Hz]")
+
+    @model_validator(mode="after")
+    def _has_length(self) -> TrackCircuit:
+        if self.end_m <= self.start_m:
+            raise ValueError(f"end_m: {self.end_m:g} is not past start_m, {self.start_m:g}")
+        return self
+
+
+class Harmonic(Description):
+    """A line of the traction current's spectrum, as heard at every antenna and receiver."""
+
+    order: int = Field(ge=1, le=1000, description="multiple of the fundamental")
+    amplitude_v: Volts = Field(description="amplitude [V]")
+
+
+class RailFault(Description):
+    """Something that goes wrong in the rails, from and to a simulated time.
+
+    ``sanding``: ``train`` picks up ``loss_db`` less of what flows in the rails.
+    ``broken_rail``: what would pass ``at_m`` of ``circuit`` (its middle if not said) is
+    weaker by ``loss_db``. ``dead_transmitter``: that of ``circuit`` sends nothing.
+    """
+
+    kind: Literal["sanding", "broken_rail", "dead_transmitter"]
+    from_s: Seconds = 0.0
+    to_s: Seconds = 1e9
+    train: str | None = None
+    circuit: str | None = None
+    at_m: Chainage | None = None
+    loss_db: Decibels = 60.0
+
+    @model_validator(mode="after")
+    def _names_its_place(self) -> RailFault:
+        if (self.train is None) == (self.kind == "sanding"):
+            raise ValueError(f"train: goes with sanding, and only with it, not {self.kind}")
+        if (self.circuit is None) != (self.kind == "sanding"):
+            raise ValueError(f"circuit: does not agree with {self.kind}")
+        if self.at_m is not None and self.kind != "broken_rail":
+            raise ValueError(f"at_m: goes with broken_rail only, not {self.kind}")
+        return self
+
+
+class RailDescription(Description):
+    """Everything the rail medium knows besides where the trains are.
+
+    Levels are amplitudes referred to the terminals of an antenna over the rails, or of a
+    receiver at them. The defaults are typical magnitudes, assumed here.
+    """
+
+    circuits: tuple[TrackCircuit, ...] = Field(min_length=1, max_length=100_000)
+    tracks: tuple[str, ...] = Field(
+        default=(), description="order that counts the tracks; empty = as the circuits name them"
+    )
+    trains: tuple[str, ...] = ()
+    sample_rate_hz: Number = Field(default=16_000.0, gt=0.0, le=1e6)
+    transmit_level_v: Volts = Field(
+        default=1.0, description="amplitude that a transmitted sample of 1 has at its feed [V]"
+    )
+    attenuation_db_per_km: Decibels = Field(default=6.0, description="of compensated rails")
+    joint_attenuation_db: Decibels = Field(default=40.0, description="across one joint")
+    shunt_attenuation_db: Decibels = Field(default=50.0, description="past the axles of a train")
+    white_noise_v: Volts = Field(default=1e-3, description="rms of a sample [V]")
+    impulse_rate_per_s: Number = Field(
+        default=0.0, ge=0.0, le=1e4, description="of each antenna and receiver [1/s]"
+    )
+    impulse_amplitude_v: Volts = Field(default=0.0, description="mean height of an impulse [V]")
+    fundamental_hz: Number = Field(default=50.0, gt=0.0, le=1000.0, description="of the traction")
+    harmonics: tuple[Harmonic, ...] = ()
+    faults: tuple[RailFault, ...] = ()
+
+    @property
+    def track_order(self) -> tuple[str, ...]:
+        """Names of the tracks in the order that counts them."""
+        return self.tracks or tuple(dict.fromkeys(circuit.track for circuit in self.circuits))
+
+    def samples(self, tick_s: float) -> int:
+        """Samples in a tick of ``tick_s``.
+
+        Raises
+        ------
+        ValueError
+            If that is not a whole number above zero.
+        """
+        return whole_samples(self.sample_rate_hz, tick_s)
+
+    @model_validator(mode="after")
+    def _agrees(self) -> RailDescription:
+        names = {circuit.name: circuit for circuit in self.circuits}
+        if len(names) != len(self.circuits):
+            raise ValueError("circuits: a name comes twice")
+        for circuit in self.circuits:
+            if circuit.track not in self.track_order:
+                raise ValueError(f"circuits: {circuit.name}: there is no track {circuit.track}")
+        along = sorted(self.circuits, key=lambda c: (c.track, c.start_m))
+        for one, other in itertools.pairwise(along):
+            if one.track == other.track and one.end_m != other.start_m:
+                raise ValueError(
+                    f"circuits: {other.name} starts at {other.start_m:g}, but {one.name} before it"
+                    f" ends at {one.end_m:g}"
+                )
+        for fault in self.faults:
+            if fault.train is not None and fault.train not in self.trains:
+                raise ValueError(f"faults: there is no train {fault.train}")
+            if fault.circuit is not None and fault.circuit not in names:
+                raise ValueError(f"faults: there is no circuit {fault.circuit}")
+            if fault.circuit is not None and fault.at_m is not None:
+                circuit = names[fault.circuit]
+                if not circuit.start_m <= fault.at_m <= circuit.end_m:
+                    raise ValueError(f"faults: at_m {fault.at_m:g} is not in {fault.circuit}")
+        nyquist_hz = 0.5 * self.sample_rate_hz
+        highest_hz = max((h.order for h in self.harmonics), default=0) * self.fundamental_hz
+        if highest_hz >= nyquist_hz:
+            raise ValueError(f"harmonics: {highest_hz:g} Hz is not below {nyquist_hz:g} Hz")
+        return self

@@ -1,0 +1,1 @@
+"""Trains: vehicles, drivers and how they move."""

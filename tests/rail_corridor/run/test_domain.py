@@ -1,0 +1,37 @@
+"""Two corridors in one ROS domain are refused before anything starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rail_corridor.errors import InputError
+from rail_corridor.run.domain import sole_corridor
+
+
+@pytest.fixture(autouse=True)
+def _domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
+
+
+@pytest.mark.parametrize("first", [None, "wayside", "onboard"])
+@pytest.mark.parametrize("second", [None, "wayside", "onboard"])
+def test_what_may_run_side_by_side(tmp_path: Path, first: str | None, second: str | None) -> None:
+    with sole_corridor(first, tmp_path):
+        if None in (first, second) or first == second:
+            line = "ROS_DOMAIN_ID: 7: a corridor is running in this domain already"
+            with pytest.raises(InputError, match=line), sole_corridor(second, tmp_path):
+                pass
+        else:
+            with sole_corridor(second, tmp_path):
+                pass
+    with sole_corridor(second, tmp_path):
+        pass  # free again
+
+
+def test_another_domain_is_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with sole_corridor(None, tmp_path):
+        monkeypatch.setenv("ROS_DOMAIN_ID", "8")
+        with sole_corridor(None, tmp_path):
+            pass

@@ -1,0 +1,132 @@
+"""The table of topics: names can be told apart, types and quality of service are sound."""
+
+from __future__ import annotations
+
+import itertools
+import re
+
+import pytest
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSCompatibility,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
+
+from rail_msgs_py.topics.builtin import ALL, MODULES, kind_of
+from rail_msgs_py.topics.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
+from rail_msgs_py.topics.ranging import RANGE
+from rail_msgs_py.topics.tick import FAILED, FINISHED, OBSERVED, READY
+from rail_msgs_py.topics.topic import Topic
+from rail_msgs_py.topics.world import CORRIDOR_PATH
+
+PARTS = {
+    "train": ("train_1", "a", "world_2"),
+    "site": ("wrs1", "zone_controller_2", "s"),
+    "zone": ("zone1", "tx", "range"),
+    "circuit": ("tc1", "wrs1", "zone_controller"),
+    "track": ("main", "markers", "path"),
+    "channel": (1, 42),
+    "base": ("base1", "wrs1", "b"),
+    "station": ("ref1", "wrs1", "r"),
+    "supervision": ("atp", "code_supervision"),
+    "end": ("head", "tail"),
+    "node": ("/world/radio_medium", "/wayside/zone_controller"),
+}
+FIELDS = {
+    name: value
+    for module in MODULES
+    for name, value in vars(module).items()
+    if isinstance(value, Topic)
+}
+
+
+def placeholders(topic: Topic) -> list[str]:
+    """Return the names of the placeholders of a pattern."""
+    return re.findall(r"\{(\w+)\}", topic.pattern)
+
+
+def names_of(topic: Topic) -> list[str]:
+    """Return several names of a kind of topic, some of them chosen to confuse."""
+    keys = placeholders(topic)
+    combinations = itertools.product(*(PARTS[key] for key in keys))
+    return [topic.name(**dict(zip(keys, values, strict=True))) for values in combinations]
+
+
+def test_the_table_is_complete_and_names_nothing_twice() -> None:
+    assert sorted(ALL, key=lambda t: t.pattern) == sorted(FIELDS.values(), key=lambda t: t.pattern)
+    assert len({topic.pattern for topic in ALL}) == len(ALL)
+
+
+@pytest.mark.parametrize("topic", ALL, ids=lambda t: t.pattern)
+def test_every_name_tells_its_kind_and_no_other(topic: Topic) -> None:
+    for name in names_of(topic):
+        assert re.fullmatch(r"(/[A-Za-z_]\w*)+", name), "a ROS name"
+        assert kind_of(name) is topic
+        others = [other.pattern for other in ALL if other is not topic and other.matches(name)]
+        assert others == []
+
+
+@pytest.mark.parametrize("topic", ALL, ids=lambda t: t.pattern)
+def test_every_topic_is_documented(topic: Topic) -> None:
+    for text in (topic.sender, topic.readers, topic.text):
+        assert text.strip()
+    assert topic.text.endswith(".")
+    assert name_of(topic.qos) in ("stream", "estimate", "latched")
+
+
+@pytest.mark.parametrize(
+    "name", ["/", "/rosout", "/parameter_events", "/wayside/wrs1/zone1", "/train_1/vrs/rx", "tx"]
+)
+def test_a_foreign_name_has_no_kind(name: str) -> None:
+    assert kind_of(name) is None
+
+
+def test_a_missing_part_of_a_name_is_an_error() -> None:
+    with pytest.raises(KeyError):
+        RANGE.name(site="wrs1")
+
+
+@pytest.mark.parametrize("topic", [t for t in ALL if t.view], ids=lambda t: t.pattern)
+def test_a_view_reads_the_type_of_its_topic(topic: Topic) -> None:
+    assert callable(topic.view.from_msg)
+    if topic.type().get_fields_and_field_types().keys() == {"layout", "data"}:
+        # an empty multi-array is nobody's layout
+        with pytest.raises(ValueError):
+            topic.view.from_msg(topic.type())
+    else:
+        topic.view.from_msg(topic.type())
+
+
+@pytest.mark.parametrize("profile", [STREAM, ESTIMATE, LATCHED], ids=name_of)
+def test_every_profile_is_reliable_and_serves_a_default_reader(profile: QoSProfile) -> None:
+    assert profile.reliability == ReliabilityPolicy.RELIABLE
+    assert profile.history == HistoryPolicy.KEEP_LAST
+    for reader in (QoSProfile(depth=10), profile):
+        compatibility, reason = qos_check_compatible(profile, reader)
+        assert compatibility != QoSCompatibility.ERROR, reason
+
+
+def test_what_the_report_reads_outlasts_the_window_it_may_lag() -> None:
+    assert ESTIMATE.depth >= 2 * OBSERVER_WINDOW_TICKS
+    read_late = [t for t in ALL if "the report" in t.readers and t.qos is not LATCHED]
+    assert len(read_late) > 10
+    assert all(topic.qos is ESTIMATE for topic in read_late)
+
+
+def test_what_late_joiners_must_learn_is_latched() -> None:
+    latched = (READY, FAILED, FINISHED, CORRIDOR_PATH)
+    assert all(t.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for t in latched)
+    assert STREAM.durability == DurabilityPolicy.VOLATILE
+    # a report that is connected after the first tick still gets it
+    assert ESTIMATE.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    assert OBSERVED.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    # one message of each node at least, and every part of the map
+    assert LATCHED.depth >= 100
+
+
+def test_an_unknown_profile_has_no_name() -> None:
+    with pytest.raises(KeyError):
+        name_of(QoSProfile(depth=1))

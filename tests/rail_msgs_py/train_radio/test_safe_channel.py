@@ -1,0 +1,311 @@
+"""The safe channel: only what the right peer sealed now, for me, once and in order."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rail_msgs_py.train_radio.safe_channel import SafeChannel
+from rail_msgs_py.train_radio.safe_frame import (
+    FRAME_BYTES,
+    DirectionKeys,
+    Header,
+    Kind,
+    SafetyCode,
+    payload_of,
+    read_header,
+    write_header,
+)
+from rail_msgs_py.train_radio.safe_result import Accepted, Greeted, Opened, Reason, Rejected
+
+SECRET = b"a secret for the tests"
+CONTROLLER, TRAIN, OTHER_TRAIN = 1, 101, 102
+REPORT, AUTHORITY = Kind.LOCATION_REPORT, Kind.MOVEMENT_AUTHORITY
+SECOND = 1_000_000_000
+
+
+def end(own: int, peer: int, seed: int, skew_s: float = 0.0) -> SafeChannel:
+    kind = REPORT if own == CONTROLLER else AUTHORITY
+    draw = np.random.default_rng(seed).bytes
+    return SafeChannel(SECRET, own, peer, [kind], draw, max_age_s=1.0, clock_skew_s=skew_s)
+
+
+def greet(one: SafeChannel, other: SafeChannel, time_ns: int) -> None:
+    """Bring both ends into a session: a greeting, its answer, and data that proves the rest."""
+    assert other.open(one.seal(kind_from(one), b"", time_ns), time_ns) == Greeted(False)
+    assert one.open(other.seal(kind_from(other), b"", time_ns), time_ns) == Greeted(True)
+    assert isinstance(other.open(one.seal(kind_from(one), b"", time_ns), time_ns), Accepted)
+    assert one.established and other.established
+
+
+def kind_from(sender: SafeChannel) -> Kind:
+    return AUTHORITY if sender.own == CONTROLLER else REPORT
+
+
+def pair(skew_s: float = 0.0) -> tuple[SafeChannel, SafeChannel]:
+    """Controller and train in a session made at time 0."""
+    controller = end(CONTROLLER, TRAIN, 1, skew_s)
+    train = end(TRAIN, CONTROLLER, 2, skew_s)
+    greet(train, controller, 0)
+    return controller, train
+
+
+def reason(opened: Opened) -> Reason:
+    assert isinstance(opened, Rejected), opened
+    return opened.reason
+
+
+@pytest.mark.parametrize(
+    ("message", "mac"),
+    [
+        ("", "bb1d6929e95937287fa37d129b756746"),
+        ("6bc1bee22e409f96e93d7e117393172a", "070a16b46b4d4144f79bdd9dd04a287c"),
+        (
+            "6bc1bee22e409f96e93d7e117393172aae2d8a571e03ac9c9eb76fac45af8e5130c81c46a35ce411",
+            "dfa66747de9ae63030ca32611497c827",
+        ),
+    ],
+)
+def test_the_safety_code_is_that_of_rfc_4493(message: str, mac: str) -> None:
+    code = SafetyCode(bytes.fromhex("2b7e151628aed2a6abf7158809cf4f3c"))
+    assert code.of(bytes.fromhex(message)).hex() == mac[:16]
+
+
+def test_a_frame_is_one_burst_and_stands_as_documented() -> None:
+    _, train = pair()
+    frame = train.seal(REPORT, b"payload", 4 * SECOND + 1999)
+    assert len(frame) == FRAME_BYTES == 64
+    assert frame[0] == 0x11 and frame[1] == 7
+    assert frame[2:10].hex() == "0065000100000002"
+    assert int.from_bytes(frame[10:16], "big") == 4_000_001
+    assert frame[24:56] == b"payload".ljust(32, b"\0")
+
+
+def test_data_arrives_with_its_age_and_what_was_lost() -> None:
+    controller, train = pair()
+    assert controller.silence_s(0) == 0.0 and math.isinf(train.silence_s(0))
+    for _ in range(3):
+        train.seal(REPORT, b"lost", SECOND)
+    opened = controller.open(train.seal(REPORT, b"here", 2 * SECOND), 2 * SECOND + 250_000_000)
+    assert opened == Accepted(REPORT, b"here", 0.25, 5, 3, 0)
+    assert controller.silence_s(5 * SECOND) == 3.0
+    back = train.open(controller.seal(AUTHORITY, b"go", 3 * SECOND), 3 * SECOND)
+    assert back == Accepted(AUTHORITY, b"go", 0.0, 1, 0, 5)
+
+
+def test_every_single_bit_matters() -> None:
+    controller, train = pair()
+    frame = train.seal(REPORT, b"position", SECOND)
+    for bit in range(8 * FRAME_BYTES):
+        wrong = bytearray(frame)
+        wrong[bit >> 3] ^= 1 << (bit & 7)
+        assert isinstance(controller.open(bytes(wrong), SECOND), Rejected)
+    assert isinstance(controller.open(frame, SECOND), Accepted)
+
+
+@given(st.binary(min_size=1, max_size=FRAME_BYTES), st.integers(0, FRAME_BYTES - 1))
+def test_any_altered_frame_is_rejected(burst: bytes, start: int) -> None:
+    controller, train = pair()
+    frame = train.seal(REPORT, b"position", SECOND)
+    wrong = (frame[:start] + burst + frame[start + len(burst) :])[:FRAME_BYTES]
+    if wrong != frame:
+        assert isinstance(controller.open(wrong, SECOND), Rejected)
+
+
+@given(
+    st.binary(max_size=100) | st.binary(min_size=FRAME_BYTES, max_size=FRAME_BYTES),
+    st.integers(0, 2**63),
+)
+def test_any_bytes_are_rejected_and_nothing_is_raised(raw: bytes, time_ns: int) -> None:
+    controller, train = pair()
+    for target in (controller, end(CONTROLLER, TRAIN, 3)):
+        assert isinstance(target.open(raw, time_ns), Rejected)
+    assert isinstance(controller.open(train.seal(REPORT, b"", SECOND), SECOND), Accepted)
+
+
+@given(
+    st.tuples(
+        st.integers(0, 15),
+        st.integers(0, 15),
+        st.integers(0, 255),
+        st.sampled_from([CONTROLLER, TRAIN]),
+        st.sampled_from([CONTROLLER, TRAIN]),
+        st.integers(0, 2**32 - 1),
+        st.integers(0, 2**48 - 1).map(lambda ticks: 1000 * ticks),
+        st.integers(0, 2**32 - 1),
+        st.integers(0, 2**32 - 1),
+    ),
+    st.binary(min_size=32, max_size=32),
+    st.integers(0, 2**60),
+)
+def test_even_who_has_the_keys_of_greetings_makes_nothing_raise(
+    values: tuple[int, ...], payload: bytes, time_ns: int
+) -> None:
+    header = Header(*values)
+    assert read_header(write_header(header)) == header
+    keys = DirectionKeys(SECRET, TRAIN, CONTROLLER)
+    opened = pair()[0].open(keys.greeting.seal(header, payload), time_ns)
+    assert not isinstance(opened, Accepted)
+
+
+def test_repetition_and_order() -> None:
+    controller, train = pair()
+    frames = [train.seal(REPORT, bytes([n]), SECOND) for n in range(3)]
+    assert isinstance(controller.open(frames[1], SECOND), Accepted)
+    assert reason(controller.open(frames[1], SECOND)) is Reason.REPEATED
+    assert reason(controller.open(frames[0], SECOND)) is Reason.OUT_OF_ORDER
+    assert isinstance(controller.open(frames[2], SECOND), Accepted)
+
+
+@pytest.mark.parametrize("skew_s", [0.0, 0.1])
+def test_age_counts_the_clock_skew_against_the_frame(skew_s: float) -> None:
+    controller, train = pair(skew_s)
+    limit_ns = round((1.0 - skew_s) * SECOND)
+    opened = controller.open(train.seal(REPORT, b"", SECOND), SECOND + limit_ns)
+    assert isinstance(opened, Accepted) and opened.age_s == 1.0
+    late = train.seal(REPORT, b"", SECOND)
+    assert reason(controller.open(late, SECOND + limit_ns + 1)) is Reason.TOO_OLD
+    early = train.seal(REPORT, b"", 2 * SECOND)
+    before_ns = 2 * SECOND - round(skew_s * SECOND)
+    assert reason(controller.open(early, before_ns - 1)) is Reason.FROM_THE_FUTURE
+    assert isinstance(controller.open(early, before_ns), Accepted)
+
+
+def test_wrong_train_wrong_way_wrong_kind_and_wrong_key() -> None:
+    controller, train = pair()
+    other_end = end(CONTROLLER, OTHER_TRAIN, 4)
+    other_train = end(OTHER_TRAIN, CONTROLLER, 5)
+    greet(other_train, other_end, 0)
+    authority = controller.seal(AUTHORITY, b"go", SECOND)
+    assert reason(other_train.open(authority, SECOND)) is Reason.WRONG_ADDRESS
+    assert reason(controller.open(authority, SECOND)) is Reason.UNEXPECTED_KIND
+    readdressed = (
+        write_header(read_header(authority)._replace(destination=OTHER_TRAIN)) + authority[24:]
+    )
+    assert reason(other_train.open(readdressed, SECOND)) is Reason.UNKNOWN_SESSION
+    report = train.seal(REPORT, b"", SECOND)
+    forged = SafetyCode(bytes(16)).seal(read_header(report), payload_of(report))
+    assert reason(controller.open(forged, SECOND)) is Reason.SAFETY_CODE
+    greeting = end(TRAIN, CONTROLLER, 6).seal(REPORT, b"", SECOND)
+    assert reason(end(TRAIN, CONTROLLER, 7).open(greeting, SECOND)) is Reason.WRONG_ADDRESS
+
+
+def test_a_receiver_that_restarted_takes_nothing_recorded_before() -> None:
+    controller, train = pair()
+    # Still fresh, never received: the age and the numbers alone would let them pass.
+    recorded = [train.seal(REPORT, bytes([n]), SECOND) for n in range(5)]
+    controller = end(CONTROLLER, TRAIN, 8)
+    for frame in recorded:
+        assert reason(controller.open(frame, SECOND)) is Reason.UNKNOWN_SESSION
+    greet(controller, train, SECOND)
+    for frame in recorded:
+        assert reason(controller.open(frame, SECOND)) is Reason.UNKNOWN_SESSION
+
+
+def test_frames_of_a_sender_from_before_its_restart_are_of_no_use() -> None:
+    controller, train = pair()
+    recorded = [train.seal(REPORT, bytes([n]), SECOND) for n in range(5)]
+    controller.seal(AUTHORITY, b"", SECOND)  # its last frame was a greeting
+    train = end(TRAIN, CONTROLLER, 9)
+    greet(train, controller, SECOND + 1000)
+    for frame in recorded:
+        assert reason(controller.open(frame, SECOND + 1000)) is Reason.UNKNOWN_SESSION
+
+
+def test_recorded_greetings_neither_make_nor_cut_a_session() -> None:
+    controller = end(CONTROLLER, TRAIN, 1)
+    train = end(TRAIN, CONTROLLER, 2)
+    first = train.seal(REPORT, b"", 0)
+    assert controller.open(first, 0) == Greeted(False)
+    answer = controller.seal(AUTHORITY, b"", 0)
+    assert train.open(answer, 0) == Greeted(True)
+    assert isinstance(controller.open(train.seal(REPORT, b"", 0), 0), Accepted)
+    assert reason(controller.open(first, 0)) is Reason.REPEATED
+    assert reason(train.open(answer, 0)) is Reason.REPEATED
+    # A restarted end has forgotten them, and still they prove nothing to it.
+    controller = end(CONTROLLER, TRAIN, 3)
+    assert controller.open(first, 0) == Greeted(False)
+    assert not controller.established
+    # Its answer to a recorded greeting makes the train offer itself anew, beside its session.
+    assert train.open(controller.seal(AUTHORITY, b"", 1000), 1000) == Greeted(False)
+    assert train.established
+
+
+def test_answers_leave_every_other_frame_to_data() -> None:
+    controller, train = pair()
+    controller.seal(AUTHORITY, b"", 0)  # its last frame was a greeting
+    kinds = []
+    for n in range(1, 7):
+        greeting = end(TRAIN, CONTROLLER, 20 + n).seal(REPORT, b"", n * SECOND)
+        assert controller.open(greeting, n * SECOND) == Greeted(False)
+        kinds.append(read_header(controller.seal(AUTHORITY, b"", n * SECOND // 2)).kind)
+    assert kinds == [Kind.GREETING, AUTHORITY] * 3
+    assert train.established
+
+
+def test_a_session_is_given_up_after_silence() -> None:
+    controller, _ = pair()
+    assert read_header(controller.seal(AUTHORITY, b"", 5 * SECOND)).kind == AUTHORITY
+    assert read_header(controller.seal(AUTHORITY, b"", 5 * SECOND + 1)).kind == Kind.GREETING
+    assert not controller.established
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_after_any_storm_the_link_comes_back(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ends = {TRAIN: end(TRAIN, CONTROLLER, seed), CONTROLLER: end(CONTROLLER, TRAIN, seed + 1)}
+    flight: list[tuple[int, int, bytes]] = []
+    time_ns = 0
+    for _ in range(120):
+        time_ns += 100_000_000
+        for own, peer in ((TRAIN, CONTROLLER), (CONTROLLER, TRAIN)):
+            if rng.random() < 0.1:
+                ends[own] = end(own, peer, int(rng.integers(2**40)))
+            frame = ends[own].seal(kind_from(ends[own]), b"", time_ns)
+            for _ in range(rng.integers(3)):
+                flight.append((time_ns + int(rng.integers(2 * SECOND)), peer, frame))
+        flight.sort(key=lambda item: item[0])
+        while flight and flight[0][0] <= time_ns:
+            _, to, frame = flight.pop(0)
+            ends[to].open(frame, time_ns)
+    # What is still on its way keeps coming while every new frame arrives at once.
+    heard = dict.fromkeys(ends, 0)
+    for _ in range(80):
+        time_ns += 100_000_000
+        for own, peer in ((TRAIN, CONTROLLER), (CONTROLLER, TRAIN)):
+            frame = ends[own].seal(kind_from(ends[own]), b"", time_ns)
+            heard[peer] = (
+                heard[peer] + 1 if isinstance(ends[peer].open(frame, time_ns), Accepted) else 0
+            )
+        while flight and flight[0][0] <= time_ns:
+            _, to, frame = flight.pop(0)
+            ends[to].open(frame, time_ns)
+    assert min(heard.values()) >= 10
+
+
+def test_bad_arguments_are_quoted() -> None:
+    draw = np.random.default_rng(0).bytes
+    with pytest.raises(ValueError, match="must differ, got 5"):
+        SafeChannel(SECRET, 5, 5, [REPORT], draw)
+    with pytest.raises(ValueError, match=r"own .* got 65536"):
+        SafeChannel(SECRET, 65536, 5, [REPORT], draw)
+    with pytest.raises(ValueError, match="16 bytes or more, got 3"):
+        SafeChannel(b"abc", 1, 5, [REPORT], draw)
+    with pytest.raises(ValueError, match=r"max_age_s .* got nan"):
+        SafeChannel(SECRET, 1, 5, [REPORT], draw, max_age_s=math.nan)
+    with pytest.raises(ValueError, match=r"clock_skew_s .* got 2\.0"):
+        SafeChannel(SECRET, 1, 5, [REPORT], draw, clock_skew_s=2.0)
+    with pytest.raises(ValueError, match=r"session_timeout_s .* got 0\.5"):
+        SafeChannel(SECRET, 1, 5, [REPORT], draw, session_timeout_s=0.5)
+    channel = SafeChannel(SECRET, 1, 5, [REPORT], draw)
+    with pytest.raises(ValueError, match="got GREETING"):
+        channel.seal(Kind.GREETING, b"", 0)
+    with pytest.raises(ValueError, match="at most 32 bytes, got 33"):
+        channel.seal(REPORT, bytes(33), 0)
+    with pytest.raises(ValueError, match=r"time_ns .* got -1"):
+        channel.seal(REPORT, b"", -1)

@@ -1,0 +1,69 @@
+"""A train's positions by Doppler shifts, block after block, from samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rail_onboard.doppler.positioner import DopplerPositioner, Tracking
+from rail_signals.doppler.receiver import ToneReceiver
+from rail_signals.doppler.signal import block_times_s, received_tones
+from rail_signals.doppler.solver import DopplerSolver, Reason
+from rail_signals.doppler.surveyed_line import SurveyedLine
+from rail_signals.doppler.tone_plan import TonePlan
+
+PLAN = TonePlan()
+TICK_S, SPEED_MPS, OFFSET_HZ = 0.1, 40.0, -850.0
+CHAINAGE_M = np.arange(0.0, 6001.0, 5.0)
+LINE = SurveyedLine(CHAINAGE_M, CHAINAGE_M, 0 * CHAINAGE_M, 0 * CHAINAGE_M, 0 * CHAINAGE_M)
+FEET_M = np.arange(0.0, 6001.0, 500.0)
+STATIONS = np.column_stack([FEET_M, np.where(np.arange(13) % 2, 25.0, -25.0), np.full(13, 6.0)])
+SLOTS = np.arange(13) % PLAN.slots
+
+
+def block_at(s: float, rng: np.random.Generator, v: float = SPEED_MPS) -> np.ndarray:
+    near = np.flatnonzero(np.abs(FEET_M - s) < 1250.0)
+    distance = LINE.distances(STATIONS[near], s + v * block_times_s(PLAN)).T
+    block = received_tones(
+        PLAN, SLOTS[near].tolist(), distance, 30.0 / distance, offset_hz=OFFSET_HZ
+    )
+    noise = rng.normal(scale=0.02, size=(PLAN.samples, 2)).view(np.complex128)[:, 0]
+    return np.asarray(block + noise)
+
+
+def positioner(start_m: float) -> DopplerPositioner:
+    solver = DopplerSolver(PLAN, LINE, STATIONS, SLOTS)
+    return DopplerPositioner(ToneReceiver(PLAN), solver, Tracking(60.0), start_m, 1)
+
+
+def test_a_train_is_followed_past_stations_that_share_a_tone() -> None:
+    rng, mine = np.random.default_rng(4), positioner(300.0)
+    errors, known = [], 0
+    ticks = range(0, 1300, 4)
+    for tick in ticks:
+        s = 300.0 + SPEED_MPS * TICK_S * tick
+        answer = mine.locate(block_at(s, rng), 4 * TICK_S)
+        if answer.reason is Reason.NONE:
+            assert answer.fix is not None
+            known += 1
+            errors.append((answer.fix.chainage_m - s) / answer.fix.sigma_m)
+            assert answer.fix.offset_hz == pytest.approx(OFFSET_HZ, abs=20.0)
+    assert known > 0.8 * len(ticks)
+    # Variances hold what stations and oscillators may do, and here they do nothing.
+    assert np.sqrt(np.mean(np.square(errors))) < 1.1
+    assert np.abs(errors).max() < 5.0
+
+
+def test_silence_and_rubbish_are_no_position_and_the_train_is_found_again() -> None:
+    rng, mine = np.random.default_rng(4), positioner(1390.0)
+    assert mine.locate(None, 0.0).reason is Reason.TOO_FEW_STATIONS
+    assert mine.locate(np.full(PLAN.samples, np.nan, dtype=complex), 0.1).fix is None
+    noise = rng.normal(size=(PLAN.samples, 2)).view(np.complex128)[:, 0]
+    assert mine.locate(noise, 0.1).reason is Reason.TOO_FEW_STATIONS
+    found = mine.locate(block_at(1400.0, rng), 0.1)
+    assert found.fix is not None and found.fix.chainage_m == pytest.approx(1400.0, abs=1.0)
+
+
+def test_a_train_that_stands_has_no_place() -> None:
+    mine = positioner(1200.0)
+    assert mine.locate(block_at(1200.0, np.random.default_rng(1), 0.0), 0.0).fix is None

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from rail_corridor.run.plan import Plan
+from rail_corridor.plan.plan import Plan
 from rail_corridor.scenario.model import Scenario
 from rail_onboard.ranging.channel_selector import ChannelSelector
 from rail_signals.ranging.receiver import LineReceiver
@@ -15,6 +15,7 @@ from rail_signals.ranging.transponder import reply_lag_rad
 from rail_wayside.ranging.ranging_station import RangingStation
 from rail_wayside.ranging.train_tracker import Reading, ZoneTracker
 from rail_wayside.zone_controller_node import ZoneControllerParameters, zone_map_of
+from rail_world.ranging.description import RadioDescription
 from rail_world.ranging.medium import RadioMedium
 from rail_world.ranging.medium_node import antennas_of
 from rail_world.trains.traffic import Traffic
@@ -24,11 +25,12 @@ def arithmetic_ms(scenario: Scenario, plan: Plan, ticks: int) -> float:
     """Wall time that the arithmetic of a tick takes [ms]."""
     world = plan.world
     traffic = Traffic(world.trains, world.network(), world.tick_s)
-    medium = RadioMedium(world.radio, world.seed)
+    radio = world.part("ranging", RadioDescription)
+    medium = RadioMedium(radio, world.seed)
     signal = scenario.ranging.signal
     receiver = LineReceiver(signal)
     station = RangingStation(signal, scenario.ranging.comparator, scenario.transponder.delay_s)
-    pairs = {a.downlink_channel: a.uplink_channel for a in world.radio.stations}
+    pairs = {a.downlink_channel: a.uplink_channel for a in radio.stations}
     selectors = [ChannelSelector(pairs) for _ in world.trains]
     controller = next(spec for spec in plan.nodes if spec.kind == "zone_controller")
     known = ZoneControllerParameters(**controller.parameters)
@@ -36,7 +38,7 @@ def arithmetic_ms(scenario: Scenario, plan: Plan, ticks: int) -> float:
         zone_map_of(known), list(zip(known.trains, known.entry_zones, strict=True))
     )
     wave = modulate(signal, np.zeros(len(signal.tones_hz))) * 0.3
-    sent = {index: wave for index in range(len(world.radio.stations))}
+    sent = {index: wave for index in range(len(radio.stations))}
     begin = time.perf_counter()
     for tick in range(ticks):
         time_s = tick * world.tick_s
@@ -57,11 +59,9 @@ def arithmetic_ms(scenario: Scenario, plan: Plan, ticks: int) -> float:
                 lag = reply_lag_rad(found.phase_lag_rad[rows[channel]], signal, 1e-6)
                 replies[train] = (pairs[channel], modulate(signal, lag) * 0.3)
         returned = medium.uplink(tick, time_s, paths, replies)
-        readings = {a.zone: Reading(np.inf, np.inf) for a in world.radio.stations}
+        readings = {a.zone: Reading(np.inf, np.inf) for a in radio.stations}
         for (index, _), reception in returned.items():
             reading = station.read(reception.samples)
-            readings[world.radio.stations[index].zone] = Reading(
-                reading.range_m, reading.variance_m2
-            )
+            readings[radio.stations[index].zone] = Reading(reading.range_m, reading.variance_m2)
         tracker.update(time_s, readings)
     return (time.perf_counter() - begin) / ticks * 1e3

@@ -18,7 +18,9 @@ from arithmetic_floor import arithmetic_ms
 from in_process import plan_of
 from transport_floor import transport_ms
 
-from rail_corridor.scenario.model import Scenario, load_scenario, scenario_from_data
+from rail_corridor.loading.loader import load_scenario, scenario_from_data
+from rail_corridor.scenario.model import Scenario
+from rail_world.ranging.description import RadioDescription
 
 #: Stations and trains of the rows `corridor.scale_*`.
 SCALES = ((10, 5), (30, 5), (114, 1), (114, 5), (114, 10), (114, 20))
@@ -66,8 +68,9 @@ def line(stations: int, trains: int, seconds: float = 30.0) -> Scenario:
 def _row(name: str, scenario: Scenario) -> dict[str, Any]:
     report = _run(scenario)
     plan = plan_of(scenario)
-    zones, trains = len(plan.world.radio.stations), len(scenario.trains)
-    channels = len({antenna.downlink_channel for antenna in plan.world.radio.stations})
+    antennas = plan.world.part("ranging", RadioDescription).stations
+    zones, trains = len(antennas), len(scenario.trains)
+    channels = len({antenna.downlink_channel for antenna in antennas})
     transport = transport_ms(
         zones, trains, channels, min(2, channels), scenario.ranging.samples, _FLOOR_TICKS
     )

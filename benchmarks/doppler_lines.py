@@ -26,15 +26,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rail_corridor.equipment.doppler.placement import references_of
+
 # Before NumPy is loaded; harmless, and without effect, where it is loaded already.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from rail_corridor.equipment.doppler.nodes import positioning_nodes, reference_description
-from rail_corridor.equipment.doppler.referenced_track import FloatArray, ReferencedTrack
-from rail_corridor.scenario.model import Scenario, load_scenario
-from rail_corridor.scenario.overrides import Overrides
+from rail_corridor.equipment.doppler.nodes import positioning_nodes
+from rail_corridor.equipment.doppler.reference_coverage import FloatArray, ReferencedTrack
+from rail_corridor.equipment.doppler.world import reference_description
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.loading.overrides import Overrides
+from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.world import STATE
 from rail_onboard.doppler.positioner import DopplerPositioner
 from rail_onboard.doppler.positioner_node import DopplerPositionerParameters, positioner_of
@@ -80,7 +84,7 @@ def follow(scenario: Scenario, every: int) -> Run:
     positioner = positioner_in(scenario)
     level = 10.0 ** (plan.power_dbm / 20.0)
     tones = [level * reference_tone(plan.tones, slot) for slot in range(plan.slots)]
-    sent = {index: tones[s.slot] for index, s in enumerate(scenario.reference_stations)}
+    sent = {index: tones[s.slot] for index, s in enumerate(references_of(scenario))}
     rows = []
     reasons: collections.Counter[str] = collections.Counter()
     cpu_s, last_s = 0.0, 0.0
@@ -171,8 +175,7 @@ def main() -> None:
                 overrides = Overrides(
                     seed=seed,
                     track=options.folder / f"{name}.json",
-                    reference_spacing_m=options.spacing,
-                    reference_offset_m=options.offset,
+                    sections={"--spacing": options.spacing, "--offset": options.offset},
                     reverse=reverse,
                 )
                 scenario = load_scenario("real_line_sensors", overrides=overrides)

@@ -17,10 +17,12 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.loading.overrides import Overrides
+from rail_corridor.plan.plan import Plan, make_plan
 from rail_corridor.run.host import make_node
 from rail_corridor.run.middleware import discover_on
-from rail_corridor.run.plan import Plan, make_plan
-from rail_corridor.scenario.model import Overrides, Scenario, load_scenario
+from rail_corridor.scenario.model import Scenario
 
 
 def run_in_process(plan: Plan, around: Callable[[Any], None] | None = None) -> tuple[float, float]:

@@ -10,14 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from rail_corridor.run.host import NODE_CLASSES
+from rail_corridor.equipment.registry import node_kinds
 
 ROOT = Path(__file__).resolve().parents[2]
 PYPROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")  # tomllib is Python 3.11
 PACKAGES = sorted(path.parent.name for path in (ROOT / "src").glob("*/package.xml"))
 NODES: dict[str, dict[str, str]] = {"rail_corridor": {"rail": "rail_corridor.cli.main:main"}}
-for _kind, (_module, _) in NODE_CLASSES.items():
-    NODES.setdefault(_module.split(".")[0], {})[_kind] = f"{_module}:main"
+for _kind in node_kinds().values():
+    _module = _kind.target.partition(":")[0]
+    NODES.setdefault(_module.split(".")[0], {})[_kind.name] = f"{_module}:main"
 
 
 def project_value(key: str) -> str:

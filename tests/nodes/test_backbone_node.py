@@ -10,8 +10,11 @@ import pytest
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray, Header
 
-from rail_corridor.run.plan import CONTROLLER, make_plan
-from rail_corridor.scenario.model import Scenario, load_scenario
+from rail_corridor.equipment.ranging.nodes import CONTROLLER
+from rail_corridor.equipment.train_radio.placement import bases_of
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.loading.schema import parse_scenario
+from rail_corridor.plan.plan import make_plan
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.stamps import clock_to_cdr, to_ns
 from rail_msgs_py.table import Table
@@ -28,10 +31,11 @@ from rail_msgs_py.train_radio.telegrams import Telegrams
 from rail_world.train_radio.backbone import Backbone
 from rail_world.train_radio.backbone_node import BackboneNode
 from rail_world.train_radio.frame_threats import Threat
+from rail_world.train_radio.threat_description import ThreatsDescription
 from rail_world.world_file import read_world_file
 
 TICK_NS = 250_000_000
-BASES = tuple(base.name for base in load_scenario("hostile_network").bases)
+BASES = tuple(base.name for base in bases_of(load_scenario("hostile_network")))
 FIRST, SECOND = (bytes([n]) * 64 for n in (1, 2))
 
 
@@ -40,7 +44,7 @@ def parameters(directory: Path, threats: list[str], name: str = "hostile_network
     scenario = load_scenario(name)
     fault = {"kind": "threat", "threats": threats, "rate": 1.0, "from_s": 1.0}
     data = {**scenario.model_dump(mode="json", exclude_unset=True), "faults": [fault]}
-    plan = make_plan(Scenario.model_validate(data), directory)
+    plan = make_plan(parse_scenario(data), directory)
     (spec,) = (spec for spec in plan.nodes if spec.name == BACKBONE)
     return spec.parameters
 
@@ -160,7 +164,9 @@ def test_what_it_does_depends_on_the_seed_alone(graph: Any, tmp_path: Path) -> N
     heard = [Telegrams.from_msg(message) for message in network.up[BASES[0]]]
     described = read_world_file(str(tmp_path / "world.json"))
     bits = np.random.Philox(np.random.SeedSequence([described.seed, 8]))
-    same = Backbone(BASES, described.threats, np.random.Generator(bits))
+    same = Backbone(
+        BASES, described.part("threats", ThreatsDescription).periods, np.random.Generator(bits)
+    )
     for tick, batch in enumerate(heard):
         up = same.up(tick * TICK_NS, {BASES[0]: [(1, FIRST)]})
         assert list(batch.frames) == up[BASES[0]]
@@ -170,6 +176,6 @@ def test_what_it_does_depends_on_the_seed_alone(graph: Any, tmp_path: Path) -> N
 def test_a_world_without_train_radio_is_one_line(graph: Any, tmp_path: Path) -> None:
     make_plan(load_scenario("plain_line"), tmp_path)
     given = {"world_file": str(tmp_path / "world.json")}
-    with pytest.raises(ParameterError, match="describes no train radio") as caught:
+    with pytest.raises(ParameterError, match="describes no train_radio") as caught:
         BackboneNode(context=graph.context, parameters=given, services=False)
     assert "\n" not in str(caught.value)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rail_corridor.run.plan import MEDIUM, Plan, make_plan
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.equipment.ranging.nodes import MEDIUM
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import Plan, make_plan
 from rail_msgs_py.failures import failure
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.table import Table
@@ -20,6 +21,7 @@ from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.waveform import Waveform, silence
 from rail_signals.ranging.receiver import LineReceiver
 from rail_signals.ranging.signal import RangingSignal, modulate
+from rail_world.ranging.description import RadioDescription
 from rail_world.ranging.medium_node import RadioMediumNode
 
 SIGNAL = RangingSignal()
@@ -35,7 +37,7 @@ class Air:
 
     def __init__(self, graph: Any, plan: Plan, timeout_s: float = 20.0) -> None:
         self.graph = graph
-        self.stations = plan.world.radio.stations
+        self.stations = plan.world.part("ranging", RadioDescription).stations
         self._state = graph.sender(STATE)
         parts = [{"site": s.site, "zone": s.zone} for s in self.stations]
         self._down = [graph.sender(WRS_TX, **part) for part in parts]

@@ -8,15 +8,18 @@ from typing import Any
 
 import pytest
 
-from rail_corridor.cli.topic_docs import PARAMETERS, document, main, type_name
-from rail_corridor.run.host import NODE_CLASSES, make_node
-from rail_corridor.run.observer import Observer
-from rail_corridor.run.plan import NodeSpec, make_plan
-from rail_corridor.scenario.model import Overrides, load_scenario
+from rail_corridor.cli.topic_docs import document, ends_of, main, parameters_of, type_name
+from rail_corridor.equipment.node_spec import NodeSpec
+from rail_corridor.equipment.registry import kind_of, node_kinds, topics
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.loading.overrides import Overrides
+from rail_corridor.plan.plan import make_plan
+from rail_corridor.report.observer import Observer
+from rail_corridor.run.host import make_node
 from rail_msgs_py.topics import doppler, localizer, track_code, train_bus, train_radio
-from rail_msgs_py.topics.builtin import ALL, kind_of
+from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.train_radio import BACKBONE_DOWN, BACKBONE_UP, STRIKES
-from rail_msgs_py.topics.world import COMMAND, ODOMETER
+from rail_msgs_py.topics.world import COMMAND, ODOMETER, STATE
 
 TICKS = 12
 RADIO, RAILS, BUS = train_radio.TOPICS, track_code.TOPICS, train_bus.TOPICS
@@ -51,7 +54,7 @@ def start(graph: Any, directory: Path, name: str = "follow_codes") -> Corridor:
     for spec in plan.nodes:
         node = graph.add(make_node(spec, graph.context, True))
         nodes.setdefault(spec.kind, []).append(node)
-    observer = Observer(plan, tuple(scenario.tracks), lambda: None, context=graph.context)
+    observer = Observer(plan, lambda: None, context=graph.context)
     graph.add(observer)
     graph.wait(lambda: observer.complete)
     return Corridor(nodes, observer, {spec.name: spec for spec in plan.nodes})
@@ -73,9 +76,10 @@ def test_every_topic_is_documented_and_used_as_documented(
         assert topic is not None, name
         seen.add(topic.pattern)
         assert types == [type_name(topic.type)]
+        sender, readers = ends_of(topic)
         for role, documented, ends in (
-            ("sends", topic.sender, graph.bystander.get_publishers_info_by_topic(name)),
-            ("reads", topic.readers, graph.bystander.get_subscriptions_info_by_topic(name)),
+            ("sends", sender, graph.bystander.get_publishers_info_by_topic(name)),
+            ("reads", readers, graph.bystander.get_subscriptions_info_by_topic(name)),
         ):
             for end in ends:
                 assert end.qos_profile.reliability == topic.qos.reliability
@@ -86,13 +90,13 @@ def test_every_topic_is_documented_and_used_as_documented(
                         strangers.append((name, role, kind))
     assert strangers == []
     # And every documented topic is there.
-    assert seen == {topic.pattern for topic in ALL if topic not in SCENARIOS[scenario]}
+    assert seen == {topic.pattern for topic in topics() if topic not in SCENARIOS[scenario]}
 
 
 def test_every_kind_of_node_runs_here(tmp_path: Path) -> None:
     plans = [make_plan(load_scenario(name), tmp_path) for name in SCENARIOS]
     kinds = {spec.kind for plan in plans for spec in plan.nodes}
-    assert kinds == set(PARAMETERS) == set(NODE_CLASSES)
+    assert kinds == set(node_kinds())
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -100,7 +104,7 @@ def test_every_declared_parameter_is_documented(graph: Any, tmp_path: Path, scen
     corridor = start(graph, tmp_path, scenario)
     ros_own = {"use_sim_time", "start_type_description_service"}
     for kind, nodes in corridor.nodes.items():
-        fields = {field.name: field for field in dataclasses.fields(PARAMETERS[kind])}
+        fields = {field.name: field for field in dataclasses.fields(parameters_of(kind))}
         for node in nodes:
             declared = set(node.list_parameters([], 0).names)
             declared = {name for name in declared if not name.startswith("qos_overrides")}
@@ -116,7 +120,7 @@ def test_the_run_is_whole_and_nothing_was_lost(graph: Any, tmp_path: Path) -> No
     recording = observer.recording
     assert observer.failures == []
     assert recording.ticks == observer.finished_ticks == TICKS
-    for record in (recording.state, recording.links, recording.channel, recording.position):
+    for record in (recording[STATE], recording[LINKS], recording[VRS_CHANNEL], recording[POSITION]):
         assert record.ticks == TICKS
 
 
@@ -137,8 +141,8 @@ def test_the_document_is_written_or_printed(
 
 
 def test_every_field_of_every_node_is_described() -> None:
-    for parameters in PARAMETERS.values():
-        for field in dataclasses.fields(parameters):
+    for kind in node_kinds():
+        for field in dataclasses.fields(parameters_of(kind)):
             assert field.metadata["text"].strip()
             suffix = field.name.rpartition("_")[2]
             units = {"s": "s", "hz": "Hz", "m": "m", "dbm": "dBm"}

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rail_corridor.run.plan import Plan, make_plan
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import Plan, make_plan
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.table import Table, TableWriter

@@ -11,8 +11,8 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.srv import ChangeState
 
-from rail_corridor.run.plan import Plan, make_plan
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import Plan, make_plan
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.table import Table
@@ -334,5 +334,5 @@ def test_wrong_parameters_are_one_line(graph: Any, kind: Any, wrong: Any, line: 
 
 def test_a_world_without_a_bus_is_refused(graph: Any, tmp_path: Path) -> None:
     given = parameters(make_plan(load_scenario("plain_line"), tmp_path), "/world/radio_medium")
-    with pytest.raises(ParameterError, match="describes no train bus"):
+    with pytest.raises(ParameterError, match="describes no train_bus"):
         BusMediumNode(context=graph.context, parameters=given)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from rclpy.qos import QoSProfile
 
-from rail_corridor.run.plan import WORLD, Plan, make_plan
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import WORLD, Plan, make_plan
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.position import Position
 from rail_msgs_py.stamps import clock_from_cdr, to_ns
@@ -141,7 +141,7 @@ def test_late_joiners_learn_the_map_and_the_end(graph: Any, plan: Plan) -> None:
     assert path[0].header.frame_id == "map"
     assert (poses[0].pose.position.x, poses[-1].pose.position.x) == (0.0, 1200.0)
     names = {marker.text for marker in markers[0].markers if marker.text}
-    assert names == {antenna.site for antenna in plan.world.radio.stations}
+    assert names == {mast.name for mast in plan.world.drawing.masts}
 
 
 def test_a_reader_with_ros_defaults_hears_the_world(graph: Any, plan: Plan) -> None:

@@ -10,8 +10,9 @@ import pytest
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
-from rail_corridor.run.plan import CONTROLLER, Plan, make_plan
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.equipment.ranging.nodes import CONTROLLER
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import Plan, make_plan
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.position import Position
 from rail_msgs_py.ranging.range_reading import RangeReading

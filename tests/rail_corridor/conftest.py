@@ -12,6 +12,10 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import deserialize_message, serialize_message
 
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.loading.overrides import Overrides
+from rail_corridor.loading.scenario_files import files_of
+from rail_corridor.plan.plan import Plan, make_plan
 from rail_corridor.recording.frames import (
     ATTACHMENT,
     CHANNEL,
@@ -29,9 +33,7 @@ from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
 from rail_corridor.report.from_recording import report_of
 from rail_corridor.report.intake import Intake
 from rail_corridor.report.report import make_report, report_text
-from rail_corridor.run.plan import Plan, make_plan
-from rail_corridor.scenario.model import Overrides, Scenario, load_scenario
-from rail_corridor.scenario.scenario_files import files_of
+from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.failures import failure
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.message_definition import type_name
@@ -43,6 +45,7 @@ from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.tick import CLOCK, DIAGNOSTICS, FAILED, FINISHED
 from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.world import STATE
+from rail_world.ranging.description import RadioDescription
 
 TRAIN = "train_a"
 TICKS = 60
@@ -75,7 +78,7 @@ def _messages(plan: Plan, ticks: int = TICKS) -> Iterator[Said]:
     rng = np.random.default_rng(3)
     state = TableWriter((TRAIN,), STATE.columns)
     links = TableWriter((TRAIN,), LINKS.columns)
-    channels = {a.downlink_channel for a in plan.world.radio.stations}
+    channels = {a.downlink_channel for a in plan.world.part("ranging", RadioDescription).stations}
     channel = TableWriter((TRAIN,), tuple(f"c{n}" for n in range(2 + len(channels))))
     position = PositionWriter(TRAIN, "main")
     here = STATE.index
@@ -111,7 +114,7 @@ def _messages(plan: Plan, ticks: int = TICKS) -> Iterator[Said]:
 
 def _heard(plan: Plan, scenario: Scenario, said: list[Said]) -> Intake:
     """Return an intake that has heard all of this, as a live one would."""
-    intake = Intake(plan, tuple(scenario.tracks))
+    intake = Intake(plan)
     readers = {reader.name: reader for reader in intake.readers}
     for topic, name, raw in said:
         if name in readers:

@@ -10,10 +10,10 @@ from rclpy.serialization import serialize_message
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
+from rail_corridor.equipment.registry import topics
 from rail_msgs_py.message_definition import message_class, message_definition, type_name
-from rail_msgs_py.topics.builtin import ALL
 
-TYPES = sorted({type_name(topic.type) for topic in ALL})
+TYPES = sorted({type_name(topic.type) for topic in topics()})
 
 
 def parsed(name: str) -> dict[str, Any]:

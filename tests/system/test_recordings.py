@@ -18,8 +18,8 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 from rosbags.highlevel import AnyReader
 
+from rail_corridor.equipment.registry import kind_of
 from rail_msgs_py.stamps import to_ns
-from rail_msgs_py.topics.builtin import kind_of
 from rail_msgs_py.topics.qos import STREAM
 from rail_msgs_py.topics.tick import CLOCK, READY
 

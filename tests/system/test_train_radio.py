@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from rail_corridor.scenario.model import builtin_scenarios
+from rail_corridor.loading.loader import builtin_scenarios
 
 if TYPE_CHECKING:
     from .conftest import Rail

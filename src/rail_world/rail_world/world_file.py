@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from rail_world.doppler.description import ReferenceDescription
 from rail_world.line.description import JunctionDescription, TrackDescription
+from rail_world.line.drawing import Drawing
 from rail_world.line.network import Network, build_network
-from rail_world.ranging.description import RadioDescription, ZoneExtent
-from rail_world.track_code.description import RailDescription
-from rail_world.train_bus.description import BusDescription
-from rail_world.train_radio.description import CbtcDescription
-from rail_world.train_radio.threat_description import ThreatPeriod
 from rail_world.trains.description import TrainDescription
+
+Part = TypeVar("Part", bound=BaseModel)
 
 
 class TrainStop(BaseModel):
@@ -51,17 +49,12 @@ class WorldFile(BaseModel):
     tracks: dict[str, TrackDescription]
     junctions: tuple[JunctionDescription, ...] = ()
     trains: tuple[TrainDescription, ...]
-    radio: RadioDescription
-    rails: RailDescription | None = None
-    cbtc: CbtcDescription | None = None
-    threats: tuple[ThreatPeriod, ...] = Field(
-        (), description="what an intruder does to the frames on the backbone"
+    parts: dict[str, dict[str, Any]] = Field(
+        {}, description="what the media of all equipment know, by its name"
     )
-    references: ReferenceDescription | None = None
-    bus: BusDescription | None = None
+    drawing: Drawing = Drawing()
     stops: tuple[TrainStop, ...] = ()
     slips: tuple[WheelSlip, ...] = ()
-    zones: tuple[ZoneExtent, ...] = ()
     scenario: str = Field("", description="JSON, announced as it is on /world/scenario")
     odometer_error: float = Field(
         0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' relative error"
@@ -71,6 +64,19 @@ class WorldFile(BaseModel):
     def tick_ns(self) -> int:
         """Length of a tick in nanoseconds."""
         return round(self.tick_s * 1e9)
+
+    def part(self, name: str, kind: type[Part]) -> Part:
+        """What the media of one kind of equipment know.
+
+        Raises
+        ------
+        LookupError
+            If there is no such equipment.
+        pydantic.ValidationError
+        """
+        if name not in self.parts:
+            raise LookupError(f"describes no {name}")
+        return kind.model_validate(self.parts[name])
 
     def network(self) -> Network:
         """The tracks, joined."""

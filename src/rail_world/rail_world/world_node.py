@@ -148,7 +148,7 @@ class WorldNode(CorridorNode):
             publisher.publish(path_of(track))
             self._latched.append(publisher)
         publisher = self.publisher(CORRIDOR_MARKERS)
-        publisher.publish(markers(described.radio.stations, described.zones, network))
+        publisher.publish(markers(described.drawing, network))
         self._latched.append(publisher)
         publisher = self.publisher(SCENARIO)
         publisher.publish(String(data=described.scenario))

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rail_corridor.scenario.model import load_scenario
-from rail_msgs_py.topics.builtin import kind_of
+from rail_corridor.equipment.registry import kind_of
+from rail_corridor.loading.loader import load_scenario
 
 LAYOUT = json.loads(
     (Path(__file__).resolve().parents[3] / "examples" / "foxglove_layout.json").read_text()

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
+from rail_corridor.equipment.registry import kind_of
 from rail_corridor.errors import InputError
 from rail_corridor.recording.mcap_file import RecordedChannel, RecordingFile
 from rail_corridor.recording.replay import ReplayOptions, offers_of, ordered, span_of
-from rail_msgs_py.topics.builtin import kind_of
 from rail_msgs_py.topics.qos_text import offered_profiles
 from rail_msgs_py.topics.tick import READY
 

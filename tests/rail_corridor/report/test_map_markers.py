@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from visualization_msgs.msg import Marker
 
+from rail_corridor.equipment.ranging.layout import layout_of
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import make_plan
 from rail_corridor.report.map_markers import train_markers
-from rail_corridor.run.plan import make_plan
-from rail_corridor.scenario.model import Scenario, load_scenario
+from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.world import STATE
 from rail_signals.localizer.protection_level import Status
@@ -72,11 +74,11 @@ def test_zones_lie_along_the_track_in_the_colour_of_their_channels(
     scenario: Scenario, tmp_path: object
 ) -> None:
     world = make_plan(scenario, tmp_path).world  # type: ignore[arg-type]
-    found = markers(world.radio.stations, world.zones, world.network()).markers
+    found = markers(world.drawing, world.network()).markers
     lines = [marker for marker in found if marker.ns == "zones"]
-    assert len(lines) == len(scenario.layout.zones)
+    assert len(lines) == len(layout_of(scenario).zones)
     colours = {}
-    for line, zone in zip(lines, scenario.layout.zones, strict=True):
+    for line, zone in zip(lines, layout_of(scenario).zones, strict=True):
         steps = np.diff([(p.x, p.y) for p in line.points], axis=0)
         assert np.hypot(*steps.T).sum() == pytest.approx(zone.length_m, rel=1e-3)
         colours[zone.downlink_channel] = (line.color.r, line.color.g, line.color.b)

@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import make_plan, run_data_of
 from rail_corridor.report.report import make_report, print_report, write_report
-from rail_corridor.report.run_data import Recording
-from rail_corridor.run.plan import make_plan
-from rail_corridor.scenario.model import load_scenario
-from rail_msgs_py.topics.ranging import LINKS
+from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.world import STATE
 
 KEYS = {
@@ -29,14 +28,14 @@ KEYS = {
 def report_of(directory: Path, ticks: int, **more: Any) -> dict[str, Any]:
     """Return the report of a run in which nothing moved and nothing was heard."""
     scenario = load_scenario("plain_line")
-    recording = Recording(("train_a",), ("main",), channels=2)
+    recording = run_data_of(scenario)
     for tick in range(ticks):
         state = np.zeros((1, len(STATE.columns)))
         state[0, STATE.columns.index("on_line")] = 1.0
-        recording.state.put(tick, slice(None), state)
-        recording.links.put(tick, slice(None), np.zeros((1, len(LINKS.columns))))
-        recording.channel.put(tick, 0, np.array([0.0, 0.0, -math.inf, -math.inf]))
-        recording.position.put(tick, 0, np.array([0.0, 0.0, math.inf, 0.0]))
+        recording[STATE].put(tick, slice(None), state)
+        recording[LINKS].put(tick, slice(None), np.zeros((1, len(LINKS.columns))))
+        recording[VRS_CHANNEL].put(tick, 0, np.array([0.0, 0.0, -math.inf, -math.inf]))
+        recording[POSITION].put(tick, 0, np.array([0.0, 0.0, math.inf, 0.0]))
     observer: Any = SimpleNamespace(
         recording=recording,
         first_tick_s=10.0 if ticks else math.nan,
@@ -122,7 +121,7 @@ def test_threats_are_shown_where_there_are_any(tmp_path: Path) -> None:
     )
     text = " ".join(shown(report).split())
     assert "threats to 120 frames: deletion 7, delay 0; 5 rejected" in text
-    assert "forged and taken: 1 authorities, 2 reports" in text
+    assert "forged and accepted: 1 authorities, 2 reports" in text
 
 
 def test_a_run_that_never_began_is_shown_as_well(tmp_path: Path) -> None:

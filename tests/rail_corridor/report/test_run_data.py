@@ -7,11 +7,16 @@ import itertools
 import numpy as np
 import pytest
 
-from rail_corridor.report.run_data import Record, Recording
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import run_data_of
+from rail_corridor.run_data import Record, RunData
+from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
+from rail_msgs_py.topics.topic import Topic
+from rail_msgs_py.topics.world import STATE
 
 
 def test_a_record_grows_and_shows_its_gaps() -> None:
-    record = Record(rows=2, columns=3)
+    record = Record(rows=("a", "b"), columns=3)
     record.put(5000, 1, np.array([1.0, 2.0, 3.0]))
     record.put(0, slice(None), np.ones((2, 3)))
     assert record.ticks == 5001
@@ -23,15 +28,15 @@ def test_a_record_grows_and_shows_its_gaps() -> None:
     assert record.upto(9000).shape == (9000, 2, 3)
 
 
-def recording(order: tuple[int, ...] = (0, 1, 2, 3), change: float = 0.0) -> Recording:
-    made = Recording(("a", "b"), ("main",), channels=2)
+def recording(order: tuple[int, ...] = (0, 1, 2, 3), change: float = 0.0) -> RunData:
+    made = run_data_of(load_scenario("two_trains"))
     for tick in order:
-        made.state.put(tick, slice(None), np.full((2, 10), float(tick)))
-        made.links.put(tick, slice(None), np.full((2, 4), float(tick)))
+        made[STATE].put(tick, slice(None), np.full((2, 10), float(tick)))
+        made[LINKS].put(tick, slice(None), np.full((2, 4), float(tick)))
         for train in range(2):
-            made.position.put(tick, train, np.array([0.0, 10.0 * tick + train, 0.04, 20.0]))
-            made.channel.put(tick, train, np.array([1.0, 2.0, -50.0, np.nan]))
-    made.position.put(2, 1, np.array([0.0, 21.0 + change, 0.04, 20.0]))
+            made[POSITION].put(tick, train, np.array([0.0, 10.0 * tick + train, 0.04, 20.0]))
+            made[VRS_CHANNEL].put(tick, train, np.array([1.0, 2.0, -50.0, np.nan]))
+    made[POSITION].put(2, 1, np.array([0.0, 21.0 + change, 0.04, 20.0]))
     return made
 
 
@@ -45,27 +50,27 @@ def test_the_digest_does_not_depend_on_the_order_of_arrival() -> None:
 def test_the_digest_changes_with_the_last_bit_of_any_estimate() -> None:
     assert recording(change=4e-15).digest() != recording().digest()
     other = recording()
-    other.channel.put(3, 0, np.array([3.0, 4.0, -50.0, np.nan]))
+    other[VRS_CHANNEL].put(3, 0, np.array([3.0, 4.0, -50.0, np.nan]))
     assert other.digest() != recording().digest()
 
 
 def test_every_nan_is_the_same_to_the_digest() -> None:
     other = recording()
     negative = np.array([1.0, 2.0, -50.0, np.copysign(np.nan, -1.0)])
-    other.channel.put(0, 0, negative)
+    other[VRS_CHANNEL].put(0, 0, negative)
     assert other.digest() == recording().digest()
 
 
 def test_the_digest_is_of_the_estimates_not_of_the_truth() -> None:
     other = recording()
-    other.state.put(1, slice(None), np.zeros((2, 10)))
+    other[STATE].put(1, slice(None), np.zeros((2, 10)))
     assert other.digest() == recording().digest()
 
 
-@pytest.mark.parametrize("part", ["links", "channel", "position"])
-def test_what_did_not_arrive_is_counted(part: str) -> None:
+@pytest.mark.parametrize("part", [LINKS, VRS_CHANNEL, POSITION], ids=lambda t: t.pattern)
+def test_what_did_not_arrive_is_counted(part: Topic) -> None:
     whole = recording()
     assert (whole.ticks, whole.missing_ticks) == (4, 0)
     broken = recording()
-    getattr(broken, part).put(2, 1, np.nan)
+    broken[part].put(2, 1, np.nan)
     assert broken.missing_ticks == 1

@@ -8,25 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rail_corridor.equipment.ranging.calibration import transponders_of
+from rail_corridor.equipment.ranging.layout import layout_of
+from rail_corridor.equipment.ranging.nodes import CONTROLLER, MEDIUM
+from rail_corridor.equipment.ranging.world import reach_m, survey
 from rail_corridor.equipment.train_radio.nodes import CBTC_MEDIUM
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.loading.overrides import Overrides
+from rail_corridor.plan.plan import MOST_PROCESSES, WORLD, Placement, Plan, make_plan
 from rail_corridor.run.launcher import default_placement
-from rail_corridor.run.plan import (
-    CONTROLLER,
-    MEDIUM,
-    MOST_PROCESSES,
-    WORLD,
-    Placement,
-    Plan,
-    make_plan,
-)
-from rail_corridor.run.world_plan import reach_m, survey
-from rail_corridor.scenario.model import Overrides, load_scenario
 from rail_msgs_py.topics.train_radio import BACKBONE
+from rail_world.ranging.description import RadioDescription
 from rail_world.world_file import read_world_file
 
 
 def plan_of(name: str, directory: Path, zone_length_m: float | None = None) -> Plan:
-    overrides = Overrides(zone_length_m=zone_length_m)
+    overrides = Overrides(sections={"--zone-length": zone_length_m})
     return make_plan(load_scenario(name, overrides=overrides), directory)
 
 
@@ -58,7 +55,7 @@ def test_the_backbone_is_there_with_threats_only(tmp_path: Path) -> None:
     for plan, there in ((calm, False), (hostile, True)):
         fed = [spec for spec in plan.nodes if spec.kind in ("zone_controller", "cbtc_base_station")]
         assert len(fed) > 2 and all(spec.parameters["backbone"] is there for spec in fed)
-        assert bool(plan.world.threats) is there
+        assert ("threats" in plan.world.parts) is there
     wait_s = {spec.name: spec.parameters.get("timeout_s", math.nan) for spec in hostile.nodes}
     (backbone,) = (spec for spec in hostile.nodes if spec.name == BACKBONE)
     # The medium, the way up, the controller, the way down, the world.
@@ -128,7 +125,7 @@ def test_channels_are_paired_the_same_at_the_wayside_and_on_board(tmp_path: Path
 @pytest.mark.parametrize("name", ["plain_line", "branch", "demo"])
 def test_the_survey_of_a_zone_rises_and_is_the_distance_to_its_mast(name: str) -> None:
     scenario = load_scenario(name)
-    layout = scenario.layout
+    layout = layout_of(scenario)
     for zone in layout.zones:
         chainage_m, distance_m = survey(scenario, layout, zone)
         assert np.all(np.diff(chainage_m) > 0.0)
@@ -144,7 +141,7 @@ def test_the_survey_of_a_zone_rises_and_is_the_distance_to_its_mast(name: str) -
 
 def test_no_station_reaches_past_two_zones() -> None:
     scenario = load_scenario("plain_line")
-    layout = scenario.layout
+    layout = layout_of(scenario)
     for zone in layout.zones[:-2]:
         mast = layout.station(zone.station).position_m
         # Jeong et al., section 2.5: to the end of the next zone, and no further.
@@ -155,8 +152,9 @@ def test_no_station_reaches_past_two_zones() -> None:
 
 def test_antennas_of_a_branching_station_look_outward(tmp_path: Path) -> None:
     scenario = load_scenario("branch")
-    antennas = {a.zone: a for a in make_plan(scenario, tmp_path).world.radio.stations}
-    zones = [scenario.layout.zone(name) for name in ("zone5", "zone7")]
+    radio = make_plan(scenario, tmp_path).world.part("ranging", RadioDescription)
+    antennas = {antenna.zone: antenna for antenna in radio.stations}
+    zones = [layout_of(scenario).zone(name) for name in ("zone5", "zone7")]
     looks = [np.array(antennas[zone.name].boresight)[:2] for zone in zones]
     straight = [np.array(zone.boresight)[:2] for zone in zones]
     angles = [
@@ -169,12 +167,12 @@ def test_antennas_of_a_branching_station_look_outward(tmp_path: Path) -> None:
 
 def test_a_plan_is_repeatable_and_units_differ(tmp_path: Path) -> None:
     one, same = plan_of("demo", tmp_path), plan_of("demo", tmp_path)
-    assert one.transponders == same.transponders
     assert one.nodes == same.nodes
-    delays_s = [unit.delay_s for unit in one.transponders.values()]
+    units = transponders_of(load_scenario("demo"))
+    delays_s = [unit.delay_s for unit in units.values()]
     assert len(set(delays_s)) == 3
     for spec in one.nodes:
         if spec.kind == "vrs":
-            unit = one.transponders[spec.site]
+            unit = units[spec.site]
             assert spec.parameters["transponder_delay_s"] == unit.delay_s
             assert spec.parameters["delay_trim_s"] == unit.trim_s

@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 import yaml
 
+from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.model import builtin_scenarios, load_scenario
-from rail_corridor.scenario.overrides import Overrides
+from rail_corridor.loading.loader import builtin_scenarios, load_scenario
+from rail_corridor.loading.overrides import Overrides
 
 GOOD: dict[str, Any] = {
     "name": "good",
@@ -76,7 +77,7 @@ def write(folder: Path, data: object) -> Path:
 
 
 def test_the_good_scenario_is_good(tmp_path: Path) -> None:
-    assert len(load_scenario(write(tmp_path, GOOD)).layout.zones) == 8
+    assert len(layout_of(load_scenario(write(tmp_path, GOOD))).zones) == 8
 
 
 # path that is changed, value put there, field the complaint names, part of the reason
@@ -366,8 +367,8 @@ def test_a_file_that_is_too_large(tmp_path: Path) -> None:
         (Overrides(seed=-1), "command line: --seed: -1: must be greater than or equal to 0"),
         (Overrides(duration_s=0.0), "command line: --duration: 0.0: "),
         (Overrides(duration_s=float("nan")), "command line: --duration: nan: "),
-        (Overrides(zone_length_m=5.0), "command line: --zone-length: 5.0: "),
-        (Overrides(zone_length_m=600.0), "command line: --zone-length: 600.0: zone"),
+        (Overrides(sections={"--zone-length": 5.0}), "command line: --zone-length: 5.0: "),
+        (Overrides(sections={"--zone-length": 600.0}), "command line: --zone-length: 600.0: zone"),
         (Overrides(trains=0), "command line: --trains: 0: the scenario lists 3 trains"),
         (Overrides(trains=9), "command line: --trains: 9: the scenario lists 3 trains"),
     ],

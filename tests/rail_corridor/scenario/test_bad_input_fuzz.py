@@ -9,9 +9,11 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.model import Scenario, builtin_scenarios, scenario_from_data
-from rail_corridor.scenario.yaml_file import load_yaml, parse_yaml
+from rail_corridor.loading.loader import builtin_scenarios, scenario_from_data
+from rail_corridor.loading.yaml_file import load_yaml, parse_yaml
+from rail_corridor.scenario.model import Scenario
 
 BASES = [load_yaml(builtin_scenarios()[name]) for name in ("branch", "demo", "plain_line")]
 NAMES = sorted({"main", "wrs1", *(key for base in BASES for key in base)})
@@ -39,7 +41,7 @@ def outcome(data: Any) -> None:
         assert str(error).isprintable()
     else:
         assert isinstance(scenario, Scenario)
-        assert scenario.layout.zones
+        assert layout_of(scenario).zones
 
 
 def places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:

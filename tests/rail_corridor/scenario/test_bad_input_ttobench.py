@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.model import load_scenario
-from rail_corridor.scenario.overrides import Overrides
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.loading.overrides import Overrides
 
 GOOD: dict[str, Any] = {
     "metadata": {"id": "test", "library version": "TTOBench v1.2"},

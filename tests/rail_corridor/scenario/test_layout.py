@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rail_corridor.equipment.ranging.layout import Layout
-from rail_corridor.scenario.model import Scenario, load_scenario, scenario_from_data
+from rail_corridor.equipment.ranging.layout import Layout, layout_of
+from rail_corridor.loading.loader import load_scenario, scenario_from_data
+from rail_corridor.scenario.model import Scenario
 
 NO_FILES = Path("/nonexistent")
 
@@ -35,7 +36,7 @@ def channels(layout: Layout, *zones: str) -> list[tuple[int, int]]:
 
 
 def test_figure_7_channels_alternate() -> None:
-    layout = load_scenario("plain_line").layout
+    layout = layout_of(load_scenario("plain_line"))
     assert channels(layout, "zone1", "zone2", "zone3") == [(1, 2), (3, 4), (1, 2)]
     for zone, after in zip(layout.zones, layout.zones[1:], strict=False):
         assert zone.end_m == after.start_m == layout.station(after.station).at_m
@@ -44,7 +45,7 @@ def test_figure_7_channels_alternate() -> None:
 
 
 def test_figure_8_station_5_watches_both_tracks() -> None:
-    layout = load_scenario("branch").layout
+    layout = layout_of(load_scenario("branch"))
     assert channels(layout, "zone5", "zone6", "zone7") == [(1, 2), (3, 4), (5, 6)]
     assert layout.station("wrs5").zones == ("zone5", "zone7")
     assert layout.zone("zone6").station == "wrs6"
@@ -59,7 +60,7 @@ def test_figure_8_station_5_watches_both_tracks() -> None:
 
 def test_station_5_stands_between_the_tracks_at_the_fouling_point() -> None:
     scenario = load_scenario("branch")
-    layout, network = scenario.layout, scenario.network
+    layout, network = layout_of(scenario), scenario.network
     on_main = network.tracks["main"].pose(layout.zone("zone5").start_m)
     on_branch = network.tracks["branch"].pose(layout.zone("zone7").start_m)
     main_xy = np.array([on_main.x_m, on_main.y_m], dtype=float)
@@ -82,7 +83,7 @@ def test_station_5_stands_between_the_tracks_at_the_fouling_point() -> None:
 def test_equal_zones_none_longer_than_asked(
     length_m: float, zone_length_m: float, count: int
 ) -> None:
-    layout = scenario_of(length_m, zone_length_m).layout
+    layout = layout_of(scenario_of(length_m, zone_length_m))
     lengths_m = np.array([zone.length_m for zone in layout.zones])
     assert len(layout.stations) == len(layout.zones) == count
     assert lengths_m == pytest.approx(np.full(count, length_m / count))
@@ -93,7 +94,7 @@ def test_equal_zones_none_longer_than_asked(
 
 def test_zones_cover_every_track_of_the_demo_once() -> None:
     scenario = load_scenario("demo")
-    layout = scenario.layout
+    layout = layout_of(scenario)
     point = layout.fouling_points[0]
     for name, track in scenario.network.tracks.items():
         zones = [zone for zone in layout.zones if zone.track == name]
@@ -106,7 +107,7 @@ def test_zones_cover_every_track_of_the_demo_once() -> None:
 
 
 def test_zone_of_a_place() -> None:
-    layout = load_scenario("branch").layout
+    layout = layout_of(load_scenario("branch"))
     fouling = layout.fouling_points[0]
     assert layout.zone_at("main", 0.0).name == "zone1"
     assert layout.zone_at("main", 199.999).name == "zone1"
@@ -128,7 +129,7 @@ def test_masts_stand_right_of_the_track_and_look_along_it() -> None:
         },
         stations={"zone_length_m": 200.0, "mast_offset_m": 3.5, "mast_height_m": 6.0},
     )
-    station, zone = scenario.layout.stations[1], scenario.layout.zones[1]
+    station, zone = layout_of(scenario).stations[1], layout_of(scenario).zones[1]
     assert station.position_m == pytest.approx((3.5, 200.0, 6.0))
     line = np.array([-3.5, 100.0, -6.0])
     assert zone.boresight == pytest.approx(line / np.linalg.norm(line))
@@ -148,7 +149,7 @@ def test_a_branch_of_a_branch_changes_the_channels_again() -> None:
             {"track": "main", "at_m": 300, "branch": "branch"},
         ],
     )
-    layout = scenario.layout
+    layout = layout_of(scenario)
     tracks = [zone.track for zone in layout.zones]
     assert list(dict.fromkeys(tracks)) == ["main", "branch", "siding"]
     first = {track: layout.zones[tracks.index(track)] for track in dict.fromkeys(tracks)}

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.model import Scenario, builtin_scenarios, load_scenario
-from rail_corridor.scenario.overrides import Overrides
+from rail_corridor.loading.loader import builtin_scenarios, load_scenario, scenario_from_json
+from rail_corridor.loading.overrides import Overrides
 from rail_world.trains.motion import TrainMotion
 
 COMPLETE = sorted(set(builtin_scenarios()) - {"real_line", "real_line_sensors"})
@@ -48,7 +49,7 @@ def test_a_built_in_scenario_is_quick_to_load_and_named_after_its_file(name: str
 def test_trains_never_share_a_zone_and_the_run_takes_the_branch(name: str) -> None:
     """One channel pair serves one train: two trains in a zone would answer together."""
     scenario = load_scenario(name)
-    layout = scenario.layout
+    layout = layout_of(scenario)
     trains = [TrainMotion(t, scenario.network, scenario.tick_s) for t in scenario.trains]
     visited: set[str] = set()
     for _ in range(scenario.ticks):
@@ -70,7 +71,7 @@ def test_the_demo_is_three_kilometres_with_three_trains() -> None:
     scenario = load_scenario("demo")
     assert scenario.network.tracks["main"].length_m == pytest.approx(3000.0)
     assert len(scenario.trains) == 3
-    assert 12 <= len(scenario.layout.stations) <= 16
+    assert 12 <= len(layout_of(scenario).stations) <= 16
     assert any("branch" in train.route for train in scenario.trains)
     curvature = scenario.network.tracks["main"].curvature_per_m([300.0, 800.0, 2000.0])
     assert [float(k > 0) - float(k < 0) for k in curvature] == [0.0, -1.0, 1.0]
@@ -86,19 +87,22 @@ def test_plain_line_runs_at_a_steady_speed() -> None:
 
 def test_overrides_replace_what_the_file_says(tmp_path: Path) -> None:
     overrides = Overrides(
-        seed=99, duration_s=12.5, track=write_line(tmp_path / "line.json"), zone_length_m=150.0
+        seed=99,
+        duration_s=12.5,
+        track=write_line(tmp_path / "line.json"),
+        sections={"--zone-length": 150.0},
     )
     scenario = load_scenario("plain_line", overrides=overrides)
     assert scenario.seed == 99
     assert scenario.ticks == 125
     assert scenario.network.tracks["main"].length_m == 2000.0
-    assert len(scenario.layout.zones) == 14
-    assert max(zone.length_m for zone in scenario.layout.zones) <= 150.0
+    assert len(layout_of(scenario).zones) == 14
+    assert max(zone.length_m for zone in layout_of(scenario).zones) <= 150.0
 
 
 def test_zone_length_replaces_stations_placed_by_hand() -> None:
-    scenario = load_scenario("branch", overrides=Overrides(zone_length_m=120.0))
-    assert max(zone.length_m for zone in scenario.layout.zones) <= 120.0
+    scenario = load_scenario("branch", overrides=Overrides(sections={"--zone-length": 120.0}))
+    assert max(zone.length_m for zone in layout_of(scenario).zones) <= 120.0
 
 
 def test_a_real_line_gets_a_timetable(tmp_path: Path) -> None:
@@ -110,7 +114,7 @@ def test_a_real_line_gets_a_timetable(tmp_path: Path) -> None:
     assert all(train.leaves_on_arrival for train in scenario.trains)
     assert scenario.timetable is None
     assert scenario.end_when_arrived
-    assert len(scenario.layout.zones) == 10
+    assert len(layout_of(scenario).zones) == 10
 
 
 def test_a_real_line_asks_for_its_track() -> None:
@@ -136,7 +140,7 @@ def test_a_track_file_is_found_beside_the_scenario_file(
     monkeypatch.chdir(tmp_path)
     scenario = load_scenario("elsewhere/mine.yaml")
     monkeypatch.chdir("/")
-    again = Scenario.from_json(scenario.to_json())
+    again = scenario_from_json(scenario.to_json())
     assert again == scenario
     assert again.network.tracks["main"].length_m == 2000.0
 
@@ -144,9 +148,9 @@ def test_a_track_file_is_found_beside_the_scenario_file(
 @pytest.mark.parametrize("name", COMPLETE)
 def test_a_scenario_survives_the_way_to_another_process(name: str) -> None:
     scenario = load_scenario(name)
-    again = Scenario.from_json(scenario.to_json())
+    again = scenario_from_json(scenario.to_json())
     assert again == scenario
-    assert again.layout == scenario.layout
+    assert layout_of(again) == layout_of(scenario)
 
 
 def test_a_scenario_is_frozen() -> None:
@@ -164,7 +168,7 @@ def test_a_scenario_is_frozen() -> None:
 def test_unambiguous_range_of_the_comparators(
     comparator: str, low_tone_hz: float | None, range_m: float
 ) -> None:
-    from rail_corridor.scenario.sections import RangingPlan
+    from rail_corridor.equipment.ranging.section import RangingPlan
 
     plan = RangingPlan.model_validate({"comparator": comparator, "low_tone_hz": low_tone_hz})
     assert plan.unambiguous_range_m == pytest.approx(range_m, abs=1e-3)

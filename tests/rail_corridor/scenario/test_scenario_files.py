@@ -9,15 +9,11 @@ from typing import Any
 import pytest
 
 from rail_corridor.errors import InputError
+from rail_corridor.loading.loader import builtin_scenarios, load_scenario, scenario_from_data
+from rail_corridor.loading.overrides import Overrides
+from rail_corridor.loading.scenario_files import files_of, scenario_from
 from rail_corridor.recording.frames import Attachment
-from rail_corridor.scenario.model import (
-    Overrides,
-    Scenario,
-    builtin_scenarios,
-    load_scenario,
-    scenario_from_data,
-)
-from rail_corridor.scenario.scenario_files import files_of, scenario_from
+from rail_corridor.scenario.model import Scenario
 
 LINE = {
     "metadata": {"id": "test", "library version": "TTOBench v1.2"},
@@ -53,7 +49,9 @@ def test_every_built_in_scenario_comes_back_as_it_was(name: str, tmp_path: Path)
 
 
 def test_what_the_command_line_changed_is_in_it(tmp_path: Path) -> None:
-    overrides = Overrides(seed=2**62 + 1, duration_s=0.1 + 0.2, zone_length_m=123.4567890123456)
+    overrides = Overrides(
+        seed=2**62 + 1, duration_s=0.1 + 0.2, sections={"--zone-length": 123.4567890123456}
+    )
     scenario = load_scenario("plain_line", overrides=overrides)
     back = there_and_back(scenario, tmp_path / "back")
     assert (back.seed, back.duration_s) == (2**62 + 1, 0.1 + 0.2)

@@ -9,10 +9,12 @@ from typing import Any
 import pytest
 
 from rail_corridor.equipment.node_spec import NodeSpec
+from rail_corridor.equipment.ranging.layout import layout_of
+from rail_corridor.equipment.train_radio.placement import bases_of
 from rail_corridor.errors import InputError
+from rail_corridor.loading.schema import parse_scenario
+from rail_corridor.plan.plan import WORLD, make_plan
 from rail_corridor.run.kills import Executioner, Kill, check_kills, parse_kill
-from rail_corridor.run.plan import WORLD, make_plan
-from rail_corridor.scenario.model import Scenario
 from rail_corridor.studies.kill_scenarios import (
     DURATION_S,
     KINDS,
@@ -65,19 +67,19 @@ def test_every_kind_dies_and_every_case_can_be_run() -> None:
     assert set(Counter(case.kind for case in cases)) == set(KINDS)
     assert 8 < sum("faults" in case.data for case in cases) < 32
     for case in cases:
-        scenario = Scenario.model_validate(case.data)
+        scenario = parse_scenario(case.data)
         assert case.kill.node in equipment_of(scenario)[case.kind]
         assert 0.0 < case.kill.time_s < DURATION_S - 20.0
-        assert len(scenario.bases) == 3
+        assert len(bases_of(scenario)) == 3
         starts_m = [train.start_m for train in scenario.trains]
         lengths_m = [train.vehicle.length_m for train in scenario.trains]
         for ahead_m, length_m, behind_m in zip(starts_m, lengths_m, starts_m[1:], strict=False):
             assert ahead_m - length_m - behind_m > 19.0
-        assert len({scenario.layout.zone_at("main", at_m).name for at_m in starts_m}) == 3
+        assert len({layout_of(scenario).zone_at("main", at_m).name for at_m in starts_m}) == 3
 
 
 def test_all_equipment_of_the_plan_can_be_drawn(tmp_path: Path) -> None:
-    scenario = Scenario.model_validate(draw_case(1).data)
+    scenario = parse_scenario(draw_case(1).data)
     planned = Counter(spec.name for spec in make_plan(scenario, tmp_path).nodes)
     drawn = Counter(name for names in equipment_of(scenario).values() for name in names)
     assert planned == drawn + Counter([WORLD])

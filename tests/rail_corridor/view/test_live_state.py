@@ -11,8 +11,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header, String
 
-from rail_corridor.run.announcement import announcement
-from rail_corridor.scenario.model import Scenario, load_scenario
+from rail_corridor.equipment.ranging.layout import layout_of
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.loading.schema import parse_scenario
+from rail_corridor.plan.announcement import announcement
+from rail_corridor.scenario.model import Scenario
 from rail_corridor.view.frame import Asked, Lists, frame
 from rail_corridor.view.live_state import STILL_S, Picture
 from rail_corridor.view.sensors import cards
@@ -188,7 +191,7 @@ def test_the_line_is_that_of_the_scenario(corridor: Corridor) -> None:
     line = corridor.frame()["line"]
     branch = next(track for track in line["tracks"] if track["name"] == "branch")
     assert (branch["from"], branch["from_m"], branch["length_m"]) == ("main", 1420.0, 900.0)
-    zones = corridor.scenario.layout.zones
+    zones = layout_of(corridor.scenario).zones
     assert [(z["name"], z["downlink"], z["uplink"]) for z in line["zones"]] == [
         (zone.name, zone.downlink_channel, zone.uplink_channel) for zone in zones
     ]
@@ -231,7 +234,7 @@ def test_cards_of_known_and_unknown_sensors(corridor: Corridor) -> None:
     corridor.table("/train_a/vrs/channel", ("downlink", "uplink", "level_1_dbm"), 1, 2, -61.5)
     corridor.table("/train_a/radar/fix", ("chainage_m", "sigma_m", "loop_gain"), 1599.0, 0.4, 7.0)
     corridor.table("/train_a/track_code/message", CODE_RECEIVED.columns, *[math.nan] * 8)
-    zone = corridor.scenario.layout.zone_at("main", 1600.0)
+    zone = layout_of(corridor.scenario).zone_at("main", 1600.0)
     name = RANGE.name(site=zone.station, zone=zone.name)
     corridor.feed(name, RangeWriter(zone.name, 0.0, 400.0).write(4 * TICK_NS, 55.5, 0.01))
     made = {card["topic"]: card for card in cards(corridor.picture, "train_a", lambda _: 1)}
@@ -319,6 +322,6 @@ def test_every_scenario_announces_itself(name: str) -> None:
     line = corridor.picture.line
     assert line["name"] == name
     assert [train["name"] for train in line["trains"]] == list(corridor.names)
-    assert Scenario.model_validate(line["scenario"]).to_json() == corridor.scenario.to_json()
+    assert parse_scenario(line["scenario"]).to_json() == corridor.scenario.to_json()
     # The page needs what follows from it alone.
     assert "scenario" not in corridor.frame()["line"]

@@ -10,8 +10,8 @@ import pytest
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
-from rail_corridor.run.announcement import announcement
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.announcement import announcement
 from rail_corridor.view.frame import Asked, Lists, frame
 from rail_corridor.view.history import history_row
 from rail_corridor.view.live_state import Picture

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from rail_corridor.run.announcement import announcement
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.announcement import announcement
 from rail_corridor.view.scope import scope
 from rail_corridor.view.symbols import BurstReader
 from rail_msgs_py.waveform import Waveform

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
+from rail_corridor.equipment.registry import kind_of, topics
 from rail_corridor.view.switches import SERVICE_TYPE, equipment_of
 from rail_corridor.view.wanted import ARRAY, STANDING, Wish, awaited, is_waveform, of_train, wanted
-from rail_msgs_py.topics.builtin import MODULES, kind_of
+from rail_msgs_py.topics.topic import Topic
 
 ODOMETRY = ("nav_msgs/msg/Odometry",)
 NAMES: dict[str, tuple[str, ...]] = {
@@ -33,7 +35,6 @@ NAMES: dict[str, tuple[str, ...]] = {
     "/b/odometer": (ARRAY,),
     "/a/atp/telegrams": ("std_msgs/msg/UInt8MultiArray",),
 }
-TOPICS = {name: topic for module in MODULES for name, topic in vars(module).items()}
 STANDING_NAMES = {topic.name() for topic in STANDING}
 
 
@@ -77,13 +78,20 @@ def test_before_the_first_tick_nothing_is_read_that_a_node_waits_for(wish: Wish)
     assert "/clock" not in held(wish)
 
 
+def names_of(topic: Topic) -> list[str]:
+    """Names under which modules define a topic."""
+    modules = [module for name, module in sys.modules.items() if "rail_msgs_py.topics." in name]
+    return [name for m in modules for name, value in vars(m).items() if value is topic]
+
+
 def test_what_nodes_wait_for_is_known() -> None:
     sources = (Path(__file__).resolve().parents[3] / "src").glob("rail_*/rail_*/**/*_node.py")
     found: set[str] = set()
     for path in sources:
         found |= set(re.findall(r"stream_out\(\s*([A-Z_]+)", path.read_text()))
     assert len(found) > 15
-    assert {name for name in found if not awaited(TOPICS[name])} == set()
+    named = {name: topic for topic in topics() for name in names_of(topic)}
+    assert {name for name in found if not awaited(named[name])} == set()
 
 
 def test_truth_is_kept_for_many_ticks_and_events_for_all() -> None:

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rail_corridor.run.plan import make_plan
-from rail_corridor.scenario.model import Scenario, load_scenario
+from rail_corridor.equipment.ranging.layout import layout_of
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import make_plan
+from rail_corridor.scenario.model import Scenario
 from rail_onboard.ranging.channel_selector import ChannelSelector
+from rail_world.ranging.description import RadioDescription
 from rail_world.ranging.medium import RadioMedium, TrainAntennas
 
 C_MPS = 299_792_458.0
@@ -25,7 +28,7 @@ class Line:
 
     def __init__(self, scenario: Scenario, route: tuple[str, ...], directory: Path) -> None:
         plan = make_plan(scenario, directory)
-        radio = plan.world.radio
+        radio = plan.world.part("ranging", RadioDescription)
         way = scenario.network.route(list(route), 1)
         self.path_m: NDArray[np.float64] = np.arange(1.0, way.length_m - 1.0, 0.25)
         pose = way.pose(self.path_m)
@@ -46,12 +49,14 @@ class Line:
                 channel, dbm = int(channels[row]), float(level_dbm[row, place])
                 here[channel] = max(here.get(channel, -math.inf), dbm)
             self.levels.append(here)
-        zones = [scenario.layout.zone_at(*way.locate(float(path_m))) for path_m in self.path_m]
+        zones = [layout_of(scenario).zone_at(*way.locate(float(path_m))) for path_m in self.path_m]
         self.zones = zones
         changes = [n for n in range(1, count) if zones[n] is not zones[n - 1]]
         self.stations_m = self.path_m[changes]
         self.entered = [zones[n].name for n in changes]
-        self.pairs = {zone.downlink_channel: zone.uplink_channel for zone in scenario.layout.zones}
+        self.pairs = {
+            zone.downlink_channel: zone.uplink_channel for zone in layout_of(scenario).zones
+        }
 
     def check(self, selector: ChannelSelector, places: Iterable[int]) -> int:
         """Move the train over these places; return how often it changed the channel."""
@@ -99,7 +104,7 @@ def test_at_a_junction_the_pair_before_is_kept_until_one_leg_leads(tmp_path: Pat
     scenario = load_scenario("branch")
     for route, zone in ((("main",), "zone5"), (("main", "branch"), "zone7")):
         line = Line(scenario, route, tmp_path)
-        before, after = scenario.layout.zone("zone4"), scenario.layout.zone(zone)
+        before, after = layout_of(scenario).zone("zone4"), layout_of(scenario).zone(zone)
         selector = ChannelSelector(line.pairs)
         (junction_m,) = (m for m, n in zip(line.stations_m, line.entered, strict=True) if n == zone)
         used = {

@@ -17,10 +17,10 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rich.console import Console
 
+from rail_corridor.equipment.registry import kind_of
 from rail_corridor.run.middleware import discover_on
 from rail_msgs_py.stamps import to_ns
 from rail_msgs_py.standalone import spin
-from rail_msgs_py.topics.builtin import kind_of
 from rail_msgs_py.topics.qos import LATCHED
 from rail_msgs_py.topics.world import STATE
 

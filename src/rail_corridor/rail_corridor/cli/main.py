@@ -63,14 +63,15 @@ def _load(
     zone_length: float | None,
     reverse: bool,
 ) -> object:
-    from rail_corridor.scenario.model import Overrides, load_scenario
+    from rail_corridor.loading.loader import load_scenario
+    from rail_corridor.loading.overrides import Overrides
 
     overrides = Overrides(
         seed=seed,
         duration_s=duration,
         track=track,
         trains=trains,
-        zone_length_m=zone_length,
+        sections={"--zone-length": zone_length},
         reverse=reverse,
     )
     return load_scenario(scenario, overrides=overrides)
@@ -197,7 +198,7 @@ def check(
 
     from rich.console import Console
 
-    from rail_corridor.scenario.summary import print_summary
+    from rail_corridor.loading.summary import print_summary
 
     print_summary(loaded, Console())  # type: ignore[arg-type]
 
@@ -207,7 +208,7 @@ def scenarios() -> None:
     """List the built-in scenarios."""
     from rich.console import Console
 
-    from rail_corridor.scenario.summary import print_scenarios
+    from rail_corridor.loading.summary import print_scenarios
 
     print_scenarios(Console())
 

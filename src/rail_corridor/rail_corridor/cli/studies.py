@@ -139,9 +139,9 @@ def accuracy(
 
     from rich.console import Console
 
-    from rail_corridor.scenario.model import load_scenario
-    from rail_corridor.scenario.overrides import Overrides
+    from rail_corridor.loading.loader import load_scenario
+    from rail_corridor.loading.overrides import Overrides
     from rail_corridor.studies.accuracy import run_accuracy
 
-    changes = Overrides(track=track, reference_spacing_m=spacing, reference_offset_m=offset)
+    changes = Overrides(track=track, sections={"--spacing": spacing, "--offset": offset})
     run_accuracy(load_scenario(scenario, overrides=changes), speeds, out, Console())

@@ -12,55 +12,11 @@ import sys
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from rail_corridor.equipment.registry import node_kinds, topics
 from rail_msgs_py.message_definition import type_name
-from rail_msgs_py.topics.builtin import ALL
 from rail_msgs_py.topics.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
-from rail_onboard.doppler.positioner_node import DopplerPositionerParameters
-from rail_onboard.localizer.localizer_node import LocalizerParameters
-from rail_onboard.ranging.vrs_node import VrsParameters
-from rail_onboard.track_code.receiver_node import TrackCodeReceiverParameters
-from rail_onboard.track_code.supervision_node import CodeSupervisionParameters
-from rail_onboard.train_bus.monitor_node import TrainBusMonitorParameters
-from rail_onboard.train_bus.terminal_node import BusTerminalParameters
-from rail_onboard.train_radio.atp_node import AtpParameters
-from rail_onboard.train_radio.radio_node import CbtcRadioParameters
-from rail_wayside.doppler.reference_station_node import ReferenceStationParameters
-from rail_wayside.ranging.wrs_node import WrsParameters
-from rail_wayside.track_code.transmitter_node import TrackCodeTransmitterParameters
-from rail_wayside.train_radio.base_station_node import CbtcBaseStationParameters
-from rail_wayside.zone_controller_node import ZoneControllerParameters
-from rail_world.doppler.medium_node import ReferenceMediumParameters
-from rail_world.ranging.medium_node import RadioMediumParameters
-from rail_world.track_code.medium_node import RailMediumParameters
-from rail_world.train_bus.medium_node import BusMediumParameters
-from rail_world.train_radio.backbone_node import BackboneParameters
-from rail_world.train_radio.medium_node import CbtcMediumParameters
-from rail_world.world_node import WorldParameters
-
-#: Kind of node, as in `rail_corridor.run.host.NODE_CLASSES`, and its parameters.
-PARAMETERS: dict[str, Any] = {
-    "world": WorldParameters,
-    "radio_medium": RadioMediumParameters,
-    "wrs": WrsParameters,
-    "zone_controller": ZoneControllerParameters,
-    "vrs": VrsParameters,
-    "rail_medium": RailMediumParameters,
-    "track_code_transmitter": TrackCodeTransmitterParameters,
-    "track_code_receiver": TrackCodeReceiverParameters,
-    "code_supervision": CodeSupervisionParameters,
-    "cbtc_medium": CbtcMediumParameters,
-    "backbone": BackboneParameters,
-    "cbtc_base_station": CbtcBaseStationParameters,
-    "cbtc_radio": CbtcRadioParameters,
-    "atp": AtpParameters,
-    "reference_medium": ReferenceMediumParameters,
-    "reference_station": ReferenceStationParameters,
-    "doppler_positioner": DopplerPositionerParameters,
-    "localizer": LocalizerParameters,
-    "bus_medium": BusMediumParameters,
-    "bus_terminal": BusTerminalParameters,
-    "train_bus_monitor": TrainBusMonitorParameters,
-}
+from rail_msgs_py.topics.tick import CLOCK, DONE, FAILED
+from rail_msgs_py.topics.topic import Topic
 
 _INTRODUCTION = """\
 # Topics and parameters
@@ -93,22 +49,48 @@ def document() -> str:
 def tables() -> str:
     """Return the generated part: topics, quality of service, parameters of every node."""
     parts = [topic_table(), qos_table(), _PARAMETERS]
-    return "\n".join([*parts, *(parameter_table(kind) for kind in PARAMETERS)])
+    return "\n".join([*parts, *(parameter_table(kind) for kind in node_kinds())])
+
+
+def parameters_of(kind: str) -> Any:
+    """Parameters of a kind of node."""
+    node = node_kinds()[kind].load()
+    name = node.__name__.removesuffix("Node")
+    return getattr(sys.modules[node.__module__], f"{name}Parameters")
+
+
+def ends_of(topic: Topic) -> tuple[str, str]:
+    """Who sends a topic, and who reads it.
+
+    Of the topics of the tick itself, those kinds of nodes whose part in it says so.
+    """
+    kinds = node_kinds().values()
+    waiting = ", ".join(kind.name for kind in kinds if kind.waits)
+    if topic is CLOCK:
+        return topic.sender, ", ".join(kind.name for kind in kinds if kind.clocked)
+    if topic is DONE:
+        return ", ".join(kind.name for kind in kinds if kind.sink), topic.readers
+    if topic is FAILED:
+        return f"{topic.sender}: {waiting}", f"{waiting}, the report"
+    return topic.sender, topic.readers
 
 
 def topic_table() -> str:
     """Return the Markdown table of all topics."""
     rows = ["## Topics\n", "| Topic | Type | View | QoS | From | To |", "|---|---|---|---|---|---|"]
-    for topic in ALL:
+    table = topics()
+    for topic in table:
+        sender, readers = ends_of(topic)
         view = f"`{topic.view.__name__}`" if topic.view else ""
         name = topic.pattern.replace("{", "<").replace("}", ">")
         rows.append(
             f"| `{name}` | `{type_name(topic.type)}` | {view} | {name_of(topic.qos)}"
-            f" | {topic.sender} | {topic.readers} |"
+            f" | {sender} | {readers} |"
         )
     rows.append("\nWhat they carry:\n")
     rows += [
-        f"- `{topic.pattern.replace('{', '<').replace('}', '>')}`: {topic.text}" for topic in ALL
+        f"- `{topic.pattern.replace('{', '<').replace('}', '>')}`: {topic.text}"
+        for topic in topics()
     ]
     return "\n".join(rows) + "\n"
 
@@ -136,7 +118,7 @@ def qos_table() -> str:
 
 def parameter_table(kind: str) -> str:
     """Return the Markdown table of the parameters of one kind of node."""
-    parameters = PARAMETERS[kind]
+    parameters = parameters_of(kind)
     hints = get_type_hints(parameters)
     rows = [
         f"### {kind}\n",

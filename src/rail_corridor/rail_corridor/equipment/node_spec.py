@@ -1,11 +1,42 @@
-"""One node of a plan."""
+"""Kinds of nodes, and one node of a plan."""
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 Side = Literal["world", "wayside", "onboard"]
+
+
+@dataclass(frozen=True)
+class NodeKind:
+    """One kind of node.
+
+    Parameters
+    ----------
+    name : str
+        Of the kind, and of its command in the ament packages.
+    target : str
+        ``module:Class``.
+    clocked : bool
+        Whether it acts on ``/clock``, so that the world waits for its subscription.
+    sink : bool
+        Whether the tick ends only when it is done.
+    waits : bool
+        Whether it waits for others, so that it names on ``/failed`` who is missing.
+    """
+
+    name: str
+    target: str
+    clocked: bool = False
+    sink: bool = False
+    waits: bool = False
+
+    def load(self) -> Any:
+        """Its class."""
+        module, _, name = self.target.partition(":")
+        return getattr(importlib.import_module(module), name)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_corridor.report.run_data import FloatArray, Recording
+from rail_corridor.run_data import FloatArray, RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.world import COMMAND, STATE
 
@@ -18,11 +18,11 @@ OVERSPEED_MPS = 0.5
 
 
 def supervision_metrics(
-    scenario: Scenario, recording: Recording, index: int, on_line: NDArray[np.bool_]
+    scenario: Scenario, recording: RunData, index: int, on_line: NDArray[np.bool_]
 ) -> dict[str, Any]:
     """Brakings, overspeed and the least distance to the rear of a train ahead on the same track."""
-    mine = recording.state.upto(recording.ticks)[:, index]
-    command = recording.command.upto(recording.ticks)[:, index]
+    mine = recording[STATE].upto(recording.ticks)[:, index]
+    command = recording[COMMAND].upto(recording.ticks)[:, index]
     speed_mps = np.abs(mine[:, STATE.index["speed_mps"]])
     limit_mps = _limits(scenario, recording, mine)
     brakes = (command[:, COMMAND.index["service_brake"]] > 0.0) & on_line
@@ -45,10 +45,10 @@ def supervision_metrics(
 
 
 def trains_ahead(
-    scenario: Scenario, recording: Recording, index: int, on_line: NDArray[np.bool_]
+    scenario: Scenario, recording: RunData, index: int, on_line: NDArray[np.bool_]
 ) -> Iterator[tuple[NDArray[np.bool_], FloatArray, FloatArray]]:
     """For every other train: ticks in which it is ahead on the same track, its front and rear."""
-    state = recording.state.upto(recording.ticks)
+    state = recording[STATE].upto(recording.ticks)
     mine = state[:, index]
     for other, train in enumerate(scenario.trains):
         if other == index:
@@ -66,7 +66,7 @@ def rises(flags: NDArray[np.bool_]) -> int:
     return int(np.count_nonzero(flags[1:] & ~flags[:-1]) + (flags.size > 0 and flags[0]))
 
 
-def _limits(scenario: Scenario, recording: Recording, mine: FloatArray) -> FloatArray:
+def _limits(scenario: Scenario, recording: RunData, mine: FloatArray) -> FloatArray:
     limits = np.full(len(mine), np.inf)
     for track, name in enumerate(recording.tracks):
         there = mine[:, STATE.index["track_index"]] == track

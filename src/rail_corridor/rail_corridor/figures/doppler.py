@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plotting import COLOURS, Picture
-from rail_corridor.scenario.model import load_scenario
 from rail_corridor.studies.accuracy import accuracy_of, draw_line
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.doppler.patent_functions import CircularSection, MixedSection, StraightSection

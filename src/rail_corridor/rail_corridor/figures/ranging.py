@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from rail_corridor.equipment.ranging.layout import Zone
+from rail_corridor.equipment.ranging.layout import Zone, layout_of
+from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plotting import COLOURS, Picture
-from rail_corridor.scenario.model import Scenario, load_scenario
+from rail_corridor.scenario.model import Scenario
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.ranging.bounds import two_way_range_variance_bound
 from rail_signals.ranging.comparators import (
@@ -180,7 +181,7 @@ def _pair(zone: Zone) -> str:
 
 
 def _fig7(figure: Figure) -> None:
-    layout = load_scenario("plain_line").layout
+    layout = layout_of(load_scenario("plain_line"))
     axes = figure.subplots()
     for zone in layout.zones:
         span, colour = (zone.start_m, zone.end_m), pair_colour(zone)
@@ -207,7 +208,7 @@ def _fig8(figure: Figure) -> None:
     figure.set_size_inches(9.5, 4.6)
     axes = figure.subplots()
     scenario = load_scenario("branch")
-    layout = scenario.layout
+    layout = layout_of(scenario)
     for zone in layout.zones:
         pose = scenario.network.tracks[zone.track].pose(np.linspace(zone.start_m, zone.end_m, 60))
         axes.plot(pose.x_m, pose.y_m, color=pair_colour(zone), lw=6.0, solid_capstyle="butt")
@@ -248,7 +249,7 @@ def _label(
 
 
 def _antennas(axes: Any, scenario: Scenario) -> None:
-    layout = scenario.layout
+    layout = layout_of(scenario)
     for station in layout.stations:
         for name in station.zones if len(station.zones) > 1 else ():
             x_m, y_m, _ = station.position_m

@@ -10,12 +10,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from rail_corridor.equipment.doppler.report import doppler_bound_m
+from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.equipment.ranging.report import position_errors
 from rail_corridor.plotting import COLOURS, Picture
 from rail_corridor.report.from_recording import RecordedRun
-from rail_corridor.report.run_data import FloatArray
+from rail_corridor.run_data import FloatArray
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
+from rail_msgs_py.topics.ranging import VRS_CHANNEL
+from rail_msgs_py.topics.track_code import CODE_SENT
 from rail_msgs_py.topics.train_radio import ATP_STATE
 from rail_msgs_py.topics.world import COMMAND, STATE
 
@@ -37,7 +40,7 @@ class RunPicture(NamedTuple):
 def _states(run: RecordedRun, index: int) -> FloatArray:
     """State of a train [tick, column], NaN while it is not on the line."""
     recording = run.intake.recording
-    state = recording.state.upto(recording.ticks)[:, index].copy()
+    state = recording[STATE].upto(recording.ticks)[:, index].copy()
     state[~(state[:, STATE.index["on_line"]] > 0.0)] = np.nan
     return state
 
@@ -65,8 +68,8 @@ def _time_distance(figure: Figure, run: RecordedRun) -> None:
         length_m = run.scenario.trains[index].vehicle.length_m
         axes.fill_between(time_s, front_m - length_m, front_m, color=colour, alpha=0.25, lw=0)
         axes.plot(time_s, front_m, dashes, color=colour, label=name)
-        if recording.cbtc:
-            end_m = recording.atp.upto(recording.ticks)[
+        if ATP_STATE in recording:
+            end_m = recording[ATP_STATE].upto(recording.ticks)[
                 :, index, ATP_STATE.index["end_of_authority_m"]
             ]
             axes.plot(time_s, end_m, color=colour, lw=1.3, ls=":")
@@ -77,7 +80,7 @@ def _time_distance(figure: Figure, run: RecordedRun) -> None:
         xlim=(0.0, time_s[-1]),
     )
     handles, labels = axes.get_legend_handles_labels()
-    if recording.cbtc:
+    if ATP_STATE in recording:
         (dotted,) = axes.plot([], [], color="black", lw=1.3, ls=":")
         handles, labels = [*handles, dotted], [*labels, "end of authority\non board"]
     axes.legend(handles, labels, loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -86,8 +89,8 @@ def _time_distance(figure: Figure, run: RecordedRun) -> None:
 def _position_error(figure: Figure, run: RecordedRun) -> None:
     recording, index = run.intake.recording, furthest(run)
     panels: list[Callable[[Any, RecordedRun, int], None]] = [_ranging_error]
-    panels += [_doppler_error] if recording.references else []
-    panels += [_localizer_error] if recording.localizer else []
+    panels += [_doppler_error] if (DOPPLER_FIX in recording) else []
+    panels += [_localizer_error] if (LOCALIZER_STATE in recording) else []
     figure.set_size_inches(9.5, 2.2 + 1.9 * len(panels))
     rows = np.atleast_1d(np.asarray(figure.subplots(len(panels), 1, sharex=True)))
     for axes, panel in zip(rows, panels, strict=True):
@@ -115,7 +118,7 @@ def _ranging_error(axes: Any, run: RecordedRun, index: int) -> None:
 def _doppler_error(axes: Any, run: RecordedRun, index: int) -> None:
     recording, state = run.intake.recording, _states(run, index)
     bound_m = doppler_bound_m(run.scenario, recording, index)
-    told_m = recording.doppler.upto(recording.ticks)[:, index, DOPPLER_FIX.index["chainage_m"]]
+    told_m = recording[DOPPLER_FIX].upto(recording.ticks)[:, index, DOPPLER_FIX.index["chainage_m"]]
     error_m = np.where(np.isnan(bound_m), np.nan, told_m - state[:, STATE.index["chainage_m"]])
     _points(axes, state[:, STATE.index["path_m"]], error_m, "by Doppler shifts,\non board")
     bound_m = np.maximum(bound_m, _LEAST_M)
@@ -126,7 +129,7 @@ def _doppler_error(axes: Any, run: RecordedRun, index: int) -> None:
 
 def _localizer_error(axes: Any, run: RecordedRun, index: int) -> None:
     recording, state = run.intake.recording, _states(run, index)
-    located = recording.located.upto(recording.ticks)[:, index]
+    located = recording[LOCALIZER_STATE].upto(recording.ticks)[:, index]
     there = located[:, LOCALIZER_STATE.index["status"]] > 0.0
     front_m = state[:, STATE.index["chainage_m"]]
     error_m = np.where(there, located[:, LOCALIZER_STATE.index["front_m"]] - front_m, np.nan)
@@ -146,12 +149,12 @@ def _handovers(figure: Figure, run: RecordedRun) -> None:
     state, route = _states(run, index), run.scenario.trains[index]
     way_m, channel = (
         state[:, STATE.index["path_m"]],
-        recording.channel.upto(recording.ticks)[:, index, 0],
+        recording[VRS_CHANNEL].upto(recording.ticks)[:, index, 0],
     )
     path = run.scenario.network.route(list(route.route), route.direction)
     starts_m = {leg.track.name: leg.path_start_m for leg in path.legs}
     low_m, high_m = np.nanmin(way_m), np.nanmax(way_m)
-    for zone in run.scenario.layout.zones:
+    for zone in layout_of(run.scenario).zones:
         if zone.track not in starts_m:
             continue
         begin_m = starts_m[zone.track] + zone.start_m
@@ -197,7 +200,7 @@ def _speeds(figure: Figure, run: RecordedRun) -> None:
     rows = np.atleast_1d(np.asarray(figure.subplots(len(names), 1, sharex=True, sharey=True)))
     for index, (axes, name) in enumerate(zip(rows, names, strict=True)):
         state = _states(run, index)
-        command = recording.command.upto(recording.ticks)[:, index]
+        command = recording[COMMAND].upto(recording.ticks)[:, index]
         way_m = state[:, STATE.index["path_m"]]
         limit = np.full(len(way_m), np.nan)
         for track, track_name in enumerate(recording.tracks):
@@ -228,7 +231,7 @@ def _has_trains(run: RecordedRun) -> bool:
 
 def _is_supervised(run: RecordedRun) -> bool:
     recording = run.intake.recording
-    return _has_trains(run) and (recording.cbtc or bool(recording.circuits))
+    return _has_trains(run) and ((ATP_STATE in recording) or CODE_SENT in recording)
 
 
 FIGURES: Final[dict[str, RunPicture]] = {

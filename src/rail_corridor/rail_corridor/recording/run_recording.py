@@ -10,10 +10,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
+from rail_corridor.equipment.registry import topics
 from rail_corridor.errors import InputError
 from rail_corridor.processes import ProcessGroup
 from rail_msgs_py.message_definition import message_definition, type_name
-from rail_msgs_py.topics.builtin import ALL
 from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, READY
 
 from .frames import Attachment, attachment_frame, metadata_frame
@@ -67,7 +67,7 @@ class RunRecording:
     ) -> None:
         self.path = path
         try:
-            for kind in {type_name(topic.type) for topic in ALL}:
+            for kind in {type_name(topic.type) for topic in topics()}:
                 message_definition(kind)
             stream = path.open("wb")
         except LookupError as error:

@@ -18,11 +18,11 @@ from rclpy.serialization import deserialize_message
 from rich.console import Console
 
 from rail_corridor.errors import InputError
+from rail_corridor.loading.scenario_files import scenario_from
+from rail_corridor.plan.plan import Plan, make_plan
 from rail_corridor.recording.mcap_file import RecordedChannel, RecordedMessage, RecordingFile
 from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
-from rail_corridor.run.plan import Plan, make_plan
 from rail_corridor.scenario.model import Scenario
-from rail_corridor.scenario.scenario_files import scenario_from
 from rail_msgs_py.message_definition import type_name
 
 from .intake import Intake, Reader
@@ -92,7 +92,7 @@ def run_of(file: RecordingFile) -> RecordedRun:
             scenario = scenario_from(file.attachments, Path(directory))
             beginning = Beginning.of(file.metadata.get(BEGIN, {}))
             plan = make_plan(scenario, Path(directory))
-            intake = Intake(plan, tuple(scenario.tracks))
+            intake = Intake(plan)
             _feed(file, intake)
             ending = Ending.of(file.metadata[END]) if END in file.metadata else None
         except InputError as error:

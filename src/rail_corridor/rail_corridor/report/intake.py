@@ -10,32 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.serialization import deserialize_message
 
-from rail_corridor.run.plan import Plan
-from rail_msgs_py.position import figures_from_cdr as position_from_cdr
+from rail_corridor.plan.plan import Plan
+from rail_corridor.run_data import Decoder, EventRecord, Record, RunData
 from rail_msgs_py.stamps import to_ns
-from rail_msgs_py.table import Table, figures_from_cdr
-from rail_msgs_py.topics.doppler import DOPPLER_FIX
-from rail_msgs_py.topics.localizer import LOCALIZER_STATE
-from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, FINISHED
 from rail_msgs_py.topics.topic import Topic
-from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT
-from rail_msgs_py.topics.train_bus import BUS_LINK, BUS_LINKS, BUS_STATE
-from rail_msgs_py.topics.train_radio import (
-    ATP_STATE,
-    AUTHORITY,
-    CBTC_LINKS,
-    RADIO_LINK,
-    REPORTS,
-    STRIKES,
-)
-from rail_msgs_py.topics.world import COMMAND, STATE
-
-from .run_data import FloatArray, Record, Recording
+from rail_msgs_py.topics.world import STATE
 
 _MOST_EVENTS: Final = 10_000
 _LEVELS: Final = {
@@ -77,30 +59,14 @@ class Intake:
     Parameters
     ----------
     plan : Plan
-    tracks : tuple of str
-        Names of the tracks in the order of the scenario.
     """
 
-    def __init__(self, plan: Plan, tracks: tuple[str, ...]) -> None:
-        radio = plan.world.radio
-        self._tick_ns = plan.world.tick_ns
+    def __init__(self, plan: Plan) -> None:
+        world = plan.world
+        self._tick_ns = world.tick_ns
         self._most_ticks = plan.ticks
-        self._tracks = {name: index for index, name in enumerate(tracks)}
-        channels = len({antenna.downlink_channel for antenna in radio.stations})
-        rails = plan.world.rails
-        circuits = () if rails is None else tuple(circuit.name for circuit in rails.circuits)
-        bus = plan.world.bus
-        self.recording = Recording(
-            radio.trains,
-            tracks,
-            channels,
-            circuits,
-            cbtc=plan.world.cbtc is not None,
-            threatened=bool(plan.world.threats),
-            references=plan.world.references is not None,
-            localizer=any(spec.kind == "localizer" for spec in plan.nodes),
-            buses=() if bus is None else tuple(each.train for each in bus.trains),
-        )
+        trains = tuple(train.name for train in world.trains)
+        self.recording = RunData(trains, tuple(world.tracks), STATE, plan.records)
         self._failures: dict[str, tuple[float, str, str]] = {}
         self._events: list[dict[str, Any]] = []
         self.finished_ticks: int | None = None
@@ -111,11 +77,11 @@ class Intake:
             Reader(DIAGNOSTICS, {}, self._take_diagnostics, raw=False),
             Reader(FINISHED, {}, self._take_finished, raw=False),
         ]
-        self._read_ranging()
-        self._read_codes()
-        self._read_authorities()
-        self._read_positions()
-        self._read_buses()
+        self.readers += [
+            Reader(spec.topic, dict(parts), self._storing(record, row, decode))
+            for spec, record in zip(plan.records, self.recording.records, strict=True)
+            for row, parts, decode in spec.ports()
+        ]
 
     @property
     def failures(self) -> list[dict[str, Any]]:
@@ -134,106 +100,17 @@ class Intake:
         """
         return sorted(self._events, key=lambda event: (event["time_s"], event["name"]))
 
-    def complete(self, ticks: int) -> bool:
-        """Whether all figures of the last of so many ticks are there."""
-        recording = self.recording
-        if not recording.trains or ticks < 1:
-            return True
-        threats = (recording.strikes,) if recording.threatened else ()
-        records = (*recording.estimates, recording.links, *threats)
-        return recording.reports.have(ticks - 1) and all(
-            record.ticks >= ticks and not np.isnan(record.upto(ticks)[ticks - 1, :, 0]).any()
-            for record in records
-        )
-
-    # What is read ------------------------------------------------------------------------
-
-    def _read(self, topic: Topic, take: Callable[[bytes], None], **parts: object) -> None:
-        self.readers.append(Reader(topic, parts, take))
-
-    def _read_ranging(self) -> None:
-        recording = self.recording
-        self._read(STATE, self._table(recording.state))
-        self._read(LINKS, self._table(recording.links))
-        for index, train in enumerate(recording.trains):
-            self._read(POSITION, lambda raw, i=index: self._take_position(i, raw), train=train)
-            self._read_row(recording.channel, VRS_CHANNEL, index, train=train)
-
-    def _read_codes(self) -> None:
-        recording = self.recording
-        for index, circuit in enumerate(recording.circuits):
-            self._read_row(recording.sent, CODE_SENT, index, circuit=circuit)
-        for index, train in enumerate(recording.trains if recording.circuits else ()):
-            self._read_row(recording.received, CODE_RECEIVED, index, train=train)
-            self._read_command(index, train, "code_supervision")
-
-    def _read_authorities(self) -> None:
-        recording = self.recording
-        if not recording.cbtc:
-            return
-        for index, train in enumerate(recording.trains):
-            self._read_row(recording.radio, RADIO_LINK, index, train=train)
-            self._read_row(recording.atp, ATP_STATE, index, train=train)
-            self._read_row(recording.authority, AUTHORITY, index, train=train)
-            self._read(REPORTS, self._reports(index), train=train)
-            self._read_command(index, train, "atp")
-        if recording.threatened:
-            self._read_row(recording.strikes, STRIKES, 0)
-        self._read(CBTC_LINKS, self._table(recording.cbtc_links))
-
-    def _read_positions(self) -> None:
-        recording = self.recording
-        for index, train in enumerate(recording.trains):
-            if recording.references:
-                self._read_row(recording.doppler, DOPPLER_FIX, index, train=train)
-            if recording.localizer:
-                self._read_row(recording.located, LOCALIZER_STATE, index, train=train)
-
-    def _read_buses(self) -> None:
-        recording = self.recording
-        for index, train in enumerate(recording.buses):
-            self._read_row(recording.bus_head, BUS_LINK, index, train=train, end="head")
-            self._read_row(recording.bus_tail, BUS_LINK, index, train=train, end="tail")
-            self._read_row(recording.bus_state, BUS_STATE, index, train=train)
-        if recording.buses:
-            self._read(BUS_LINKS, self._table(recording.bus_links, len(recording.buses)))
-
-    def _read_command(self, index: int, train: str, supervision: str) -> None:
-        command = self.recording.command
-        self._read_row(command, COMMAND, index, train=train, supervision=supervision)
-
-    def _read_row(self, record: Record, topic: Topic, row: int, **parts: object) -> None:
-        """Read the one row of each table on a topic."""
+    def _storing(
+        self, record: Record | EventRecord, row: int | slice, decode: Decoder
+    ) -> Callable[[bytes], None]:
+        """Reader of the messages of one row, or of all rows of a record."""
+        lines = isinstance(row, slice) or isinstance(record, EventRecord)
 
         def take(raw: bytes) -> None:
-            stamp_ns, figures = figures_from_cdr(raw, 1, record.columns)
-            self._put(record, stamp_ns, row, figures[0])
-
-        self._read(topic, take, **parts)
-
-    def _table(self, record: Record, rows: int | None = None) -> Callable[[bytes], None]:
-        """Reader of whole tables, with a row per train unless told otherwise."""
-        count = len(self.recording.trains) if rows is None else rows
-
-        def take(raw: bytes) -> None:
-            stamp_ns, figures = figures_from_cdr(raw, count, record.columns)
-            self._put(record, stamp_ns, slice(None), figures)
+            stamp_ns, values = decode(raw)
+            record.put(self._tick(stamp_ns), row, values if lines else values[0])
 
         return take
-
-    def _reports(self, train: int) -> Callable[[bytes], None]:
-        """Reader of the location reports taken from a train: any number of rows."""
-
-        def take(raw: bytes) -> None:
-            table = Table.from_msg(deserialize_message(raw, REPORTS.type))
-            if table.columns != REPORTS.columns:
-                raise ValueError(f"not a table of reports: {', '.join(table.columns)}")
-            self.recording.reports.put(self._tick(table.stamp_ns), train, table.values)
-
-        return take
-
-    def _put(self, record: Record, stamp_ns: int, row: int | slice, figures: FloatArray) -> None:
-        record.put(self._tick(stamp_ns), row, figures)
 
     def _tick(self, stamp_ns: int) -> int:
         """Tick of a stamp; raises ValueError if the run has none such."""
@@ -241,12 +118,6 @@ class Intake:
         if not 0 <= tick < self._most_ticks:
             raise ValueError(f"stamp of {stamp_ns} ns: the run has {self._most_ticks} ticks")
         return tick
-
-    def _take_position(self, train: int, raw: bytes) -> None:
-        stamp_ns, track, figures = position_from_cdr(raw)
-        chainage_m, variance_m2, speed_mps, _ = figures
-        row = np.array((self._tracks.get(track, -1), chainage_m, variance_m2, speed_mps))
-        self._put(self.recording.position, stamp_ns, train, row)
 
     def take_failed(self, message: Any) -> None:
         """Note that a node has failed: the first that noticed it counts."""

@@ -10,14 +10,14 @@ import numpy as np
 from geometry_msgs.msg import Point
 from visualization_msgs.msg import Marker, MarkerArray
 
+from rail_corridor.equipment.ranging.report import POSITION_COLUMNS
+from rail_corridor.run_data import FloatArray
 from rail_msgs_py.stamps import to_time
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.world import STATE
 from rail_signals.localizer.protection_level import Status
 from rail_world.line.network import Network
 from rail_world.line.track import Track
-
-from .run_data import POSITION_COLUMNS, FloatArray
 
 _POSITION = {name: index for index, name in enumerate(POSITION_COLUMNS)}
 _TRUTH, _ESTIMATE = (0.55, 0.55, 0.55, 0.8), (0.84, 0.37, 0.00, 0.8)

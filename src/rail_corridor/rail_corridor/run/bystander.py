@@ -12,10 +12,10 @@ from typing import Any, Final
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
+from rail_corridor.equipment.registry import kind_of
 from rail_msgs_py.message_definition import message_class, message_definition
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.tap import Sink
-from rail_msgs_py.topics.builtin import kind_of
 from rail_msgs_py.topics.tick import READY
 from rail_msgs_py.topics.topic import Topic
 

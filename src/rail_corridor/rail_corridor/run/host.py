@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-import importlib
+import inspect
 import os
 import signal
 import threading
@@ -11,52 +11,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rail_corridor.equipment.node_spec import NodeSpec
+from rail_corridor.equipment.registry import node_kinds
 
 if TYPE_CHECKING:
     from rail_msgs_py.tap import Tap
 
-#: Kind of node -> module and class; the ament packages name the same modules.
-NODE_CLASSES = {
-    "world": ("rail_world.world_node", "WorldNode"),
-    "radio_medium": ("rail_world.ranging.medium_node", "RadioMediumNode"),
-    "wrs": ("rail_wayside.ranging.wrs_node", "WrsNode"),
-    "zone_controller": ("rail_wayside.zone_controller_node", "ZoneControllerNode"),
-    "vrs": ("rail_onboard.ranging.vrs_node", "VrsNode"),
-    "rail_medium": ("rail_world.track_code.medium_node", "RailMediumNode"),
-    "track_code_transmitter": (
-        "rail_wayside.track_code.transmitter_node",
-        "TrackCodeTransmitterNode",
-    ),
-    "track_code_receiver": ("rail_onboard.track_code.receiver_node", "TrackCodeReceiverNode"),
-    "code_supervision": ("rail_onboard.track_code.supervision_node", "CodeSupervisionNode"),
-    "cbtc_medium": ("rail_world.train_radio.medium_node", "CbtcMediumNode"),
-    "backbone": ("rail_world.train_radio.backbone_node", "BackboneNode"),
-    "cbtc_base_station": ("rail_wayside.train_radio.base_station_node", "CbtcBaseStationNode"),
-    "cbtc_radio": ("rail_onboard.train_radio.radio_node", "CbtcRadioNode"),
-    "atp": ("rail_onboard.train_radio.atp_node", "AtpNode"),
-    "reference_medium": ("rail_world.doppler.medium_node", "ReferenceMediumNode"),
-    "reference_station": ("rail_wayside.doppler.reference_station_node", "ReferenceStationNode"),
-    "doppler_positioner": ("rail_onboard.doppler.positioner_node", "DopplerPositionerNode"),
-    "localizer": ("rail_onboard.localizer.localizer_node", "LocalizerNode"),
-    "bus_medium": ("rail_world.train_bus.medium_node", "BusMediumNode"),
-    "bus_terminal": ("rail_onboard.train_bus.terminal_node", "BusTerminalNode"),
-    "train_bus_monitor": ("rail_onboard.train_bus.monitor_node", "TrainBusMonitorNode"),
-}
-#: Kinds whose name is a parameter of the scenario rather than of the class.
-_NAMED = {
-    *("wrs", "vrs", "track_code_transmitter", "track_code_receiver", "code_supervision"),
-    *("cbtc_base_station", "cbtc_radio", "atp", "reference_station"),
-    *("doppler_positioner", "localizer"),
-    *("bus_terminal", "train_bus_monitor"),
-}
 #: With more nodes than this in a process the services are left out.
 MOST_NODES_WITH_SERVICES = 12
-
-
-def node_class(kind: str) -> Any:
-    """Class of a kind of node."""
-    module, name = NODE_CLASSES[kind]
-    return getattr(importlib.import_module(module), name)
 
 
 def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:
@@ -68,8 +29,9 @@ def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:
         "parameters": spec.parameters,
         "services": services,
     }
-    kind = node_class(spec.kind)
-    node = kind(name, **arguments) if spec.kind in _NAMED else kind(**arguments)
+    kind = node_kinds()[spec.kind].load()
+    named = "name" in inspect.signature(kind).parameters
+    node = kind(name, **arguments) if named else kind(**arguments)
     if hasattr(node, "switch_on"):
         node.switch_on()
     return node

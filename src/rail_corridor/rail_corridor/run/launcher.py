@@ -14,21 +14,22 @@ from typing import TYPE_CHECKING, Any, Literal
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+from rail_corridor.equipment.registry import node_kinds
 from rail_corridor.errors import InputError
+from rail_corridor.loading.scenario_files import files_of
+from rail_corridor.plan.plan import REPORT, WORLD, Placement, Plan, check_external, make_plan
 from rail_corridor.processes import ProcessGroup, remove_orphaned_segments
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
 from rail_corridor.report.report import make_report, print_report, report_text, write_report
 from rail_corridor.scenario.model import Scenario
-from rail_corridor.scenario.scenario_files import files_of
 
 from .bystander import FULL_NAME as BYSTANDER
 from .bystander import Bystander
 from .domain import sole_corridor
-from .host import make_context, make_nodes, node_class, run_nodes
+from .host import make_context, make_nodes, run_nodes
 from .kills import Executioner, Kill, check_kills
 from .middleware import discover_on
-from .plan import REPORT, WORLD, Placement, Plan, check_external, make_plan
 
 if TYPE_CHECKING:
     from rail_corridor.equipment.node_spec import NodeSpec
@@ -136,7 +137,7 @@ class _Run:
     def run(self) -> int:
         for specs in self._groups.values():
             for kind in {spec.kind for spec in specs}:
-                node_class(kind)
+                node_kinds()[kind].load()
         nodes = sum(len(specs) for specs in self._groups.values())
         if self._options.record is not None:
             self._recording = self._record(self._options.record, nodes)
@@ -199,18 +200,15 @@ class _Run:
         from rclpy.signals import SignalHandlerOptions
         from rclpy.task import Future
 
+        from rail_corridor.report.observer import Observer
         from rail_msgs_py.standalone import FOREVER_S
-
-        from .observer import Observer
 
         tap = self._recording.start() if self._recording else None
         context = make_context(tap)
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
         self._stop = Future()
-        tracks = tuple(self._scenario.tracks)
         self._observer = Observer(
             self._plan,
-            tracks,
             self._on_progress,
             context=context,
             record=self._options.only != "onboard",
@@ -286,11 +284,11 @@ class _Run:
 
         def poll() -> None:
             waited_s = observer.steady_s() - started_s
-            if (observer.intake.complete(ticks) or waited_s > limit_s) and not done.done():
+            if (observer.recording.complete(ticks) or waited_s > limit_s) and not done.done():
                 done.set_result(None)
 
         started_s = observer.steady_s()
-        if not observer.intake.complete(ticks):
+        if not observer.recording.complete(ticks):
             observer.every(0.01, poll)
             executor.spin_until_future_complete(done, timeout_sec=limit_s + 1.0)
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from rail_corridor.equipment.doppler.referenced_track import ReferencedTrack
+from rail_corridor.equipment.doppler.reference_coverage import ReferencedTrack
+from rail_corridor.equipment.doppler.section import REFERENCES
 from rail_corridor.errors import InputError
 from rail_corridor.plotting import COLOURS, STYLE
 from rail_corridor.scenario.model import Scenario
@@ -65,7 +66,7 @@ def run_accuracy(
     InputError
         If the scenario has no reference stations.
     """
-    if scenario.references is None:
+    if REFERENCES.of(scenario) is None:
         raise InputError("has no reference stations", field="references", value=None)
     found = [accuracy_of(scenario, track, speeds_kmh) for track in scenario.tracks]
     table = Table(

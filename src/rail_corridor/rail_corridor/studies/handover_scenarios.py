@@ -13,8 +13,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rail_corridor.equipment.ranging.layout import Layout, Zone
-from rail_corridor.scenario.model import Scenario
+from rail_corridor.equipment.ranging.layout import Layout, Zone, layout_of
+from rail_corridor.loading.schema import parse_scenario
 
 Corridor = Literal["plain", "branching"]
 Manoeuvre = Literal["running", "standing", "reversing"]
@@ -90,7 +90,7 @@ def scenario_data(situation: Situation, trains: int, seed: int) -> dict[str, Any
         last_s = data["trains"][-1]["depart_s"]
         data["duration_s"] = last_s + way_m / (situation.speed_kmh / 3.6) + 2.0
     else:
-        layout = Scenario.model_validate(data).layout
+        layout = layout_of(parse_scenario(data))
         places = _places(situation, layout, seed)[:trains]
         data["trains"] = [
             _shunting_train(situation, f"train_{index + 1}", *place, rng)

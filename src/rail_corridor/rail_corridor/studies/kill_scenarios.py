@@ -13,9 +13,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from rail_corridor.equipment.ranging.layout import layout_of
+from rail_corridor.equipment.ranging.nodes import CONTROLLER, MEDIUM
 from rail_corridor.equipment.train_radio.nodes import CBTC_MEDIUM
+from rail_corridor.equipment.train_radio.placement import bases_of
+from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.run.kills import Kill
-from rail_corridor.run.plan import CONTROLLER, MEDIUM
 from rail_corridor.scenario.model import Scenario
 
 DURATION_S: Final = 70.0
@@ -57,7 +60,7 @@ def draw_case(seed: int) -> KillCase:
     """
     rng = np.random.default_rng([seed, _STREAM])
     data = _scenario(seed, rng)
-    equipment = equipment_of(Scenario.model_validate(data))
+    equipment = equipment_of(parse_scenario(data))
     weights = np.array([0.5 if kind in _AIR else 1.0 for kind in KINDS])
     kind = str(rng.choice(KINDS, p=weights / weights.sum()))
     node = str(rng.choice(equipment[kind]))
@@ -69,10 +72,10 @@ def equipment_of(scenario: Scenario) -> dict[str, list[str]]:
     """Full names of all equipment of a scenario with train control by radio, by kind."""
     trains = [train.name for train in scenario.trains]
     return {
-        "wrs": [f"/wayside/{station.name}" for station in scenario.layout.stations],
+        "wrs": [f"/wayside/{station.name}" for station in layout_of(scenario).stations],
         "vrs": [f"/{train}/vrs" for train in trains],
         "zone_controller": [CONTROLLER],
-        "cbtc_base_station": [f"/wayside/{base.name}/cbtc" for base in scenario.bases],
+        "cbtc_base_station": [f"/wayside/{base.name}/cbtc" for base in bases_of(scenario)],
         "cbtc_radio": [f"/{train}/cbtc_radio" for train in trains],
         "atp": [f"/{train}/atp" for train in trains],
         "cbtc_medium": [CBTC_MEDIUM],

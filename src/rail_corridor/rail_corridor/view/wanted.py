@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
+from rail_corridor.equipment.registry import kind_of
 from rail_msgs_py.table import Table
-from rail_msgs_py.topics.builtin import kind_of
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.qos import LATCHED, STREAM

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.yaml_file import read_text_file
+from rail_corridor.loading.yaml_file import read_text_file
 
 from .touchstone_file import MeasuredSpectrum, parse_touchstone
 

@@ -17,8 +17,7 @@ CLOCK: Final = Topic(
     STREAM,
     None,
     "world",
-    "wrs, zone_controller, track_code_transmitter, cbtc_base_station, cbtc_radio, backbone, "
-    "reference_station, bus_medium, bus_terminal, train_bus_monitor",
+    "every node that acts on the clock",
     "Start of a tick.",
 )
 DONE: Final = Topic(
@@ -26,8 +25,7 @@ DONE: Final = Topic(
     Header,
     STREAM,
     None,
-    "radio_medium, rail_medium, cbtc_medium, backbone, reference_medium, bus_medium, "
-    "zone_controller",
+    "every node that ends the tick",
     "world",
     "The node has finished the tick of this stamp.",
 )
@@ -63,13 +61,8 @@ FAILED: Final = Topic(
     DiagnosticStatus,
     LATCHED,
     None,
-    "every node that waits for others, the report for the launcher: world, radio_medium, "
-    "rail_medium, cbtc_medium, backbone, zone_controller, track_code_transmitter, "
-    "cbtc_base_station, code_supervision, cbtc_radio, atp, reference_medium, localizer, "
-    "bus_medium, bus_terminal, train_bus_monitor",
-    "world, radio_medium, rail_medium, cbtc_medium, backbone, zone_controller, "
-    "track_code_transmitter, cbtc_base_station, code_supervision, cbtc_radio, atp, "
-    "reference_medium, localizer, bus_medium, bus_terminal, train_bus_monitor, the report",
+    "every node that waits for others, the report for the launcher",
+    "every node that waits for others, the report",
     "A node that is not waited for any longer, and why.",
 )
 DIAGNOSTICS: Final = Topic(

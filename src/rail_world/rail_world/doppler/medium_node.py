@@ -14,15 +14,16 @@ from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import figures_from_cdr
 from rail_msgs_py.topics.doppler import REFERENCE_RX, REFERENCE_TX
 from rail_msgs_py.topics.tick import DONE
 from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.waveform import BlockReader, RepeatedBlock, Waveform, silence
-from rail_world.world_file import read_world_file
+from rail_world.media import read_part
 
+from .description import ReferenceDescription
 from .medium import ReferenceMedium
 
 _STATE_PORT = "state"
@@ -54,10 +55,8 @@ class ReferenceMediumNode(CorridorNode):
             "reference_medium", namespace, context=context, parameters=parameters, services=services
         )
         self._p = declare(self, ReferenceMediumParameters)
-        described = read_world_file(self._p.world_file)
-        if described.references is None:
-            raise ParameterError(f"world_file: {self._p.world_file}: describes no references")
-        self._plan = plan = described.references
+        described, part = read_part(self._p.world_file, "doppler", ReferenceDescription)
+        self._plan = plan = part
         self._tick_ns = described.tick_ns
         self._medium = ReferenceMedium(plan, described.network(), described.seed)
         owners: dict[str, str] = {}

@@ -9,13 +9,12 @@ from geometry_msgs.msg import Point, PoseStamped
 from nav_msgs.msg import Path
 from visualization_msgs.msg import Marker, MarkerArray
 
-from rail_world.ranging.description import StationAntenna, ZoneExtent
-
+from .drawing import Drawing, Stretch
 from .network import Network
 from .track import Track
 
 STEP_M = 10.0
-#: Okabe and Ito's colours, told apart by colour-blind people as well: one to a channel pair.
+#: Okabe and Ito's colours, told apart by colour-blind people as well: one to a group of stretches.
 PAIR_COLOURS = (
     *((0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.00, 0.62, 0.45), (0.80, 0.47, 0.65)),
     *((0.34, 0.71, 0.91), (0.84, 0.37, 0.00), (0.94, 0.89, 0.26)),
@@ -42,17 +41,15 @@ def path_of(track: Track) -> Path:
     return path
 
 
-def markers(
-    stations: Sequence[StationAntenna], zones: Sequence[ZoneExtent], network: Network
-) -> MarkerArray:
-    """A mast with its name for every wayside station, and its zones as lines along the track."""
-    array = MarkerArray(markers=_zone_lines(zones, network))
-    masts = {antenna.site: antenna.position_m for antenna in stations}
-    for number, (site, position_m) in enumerate(masts.items()):
-        for kind, text in ((Marker.CYLINDER, ""), (Marker.TEXT_VIEW_FACING, site)):
+def markers(drawing: Drawing, network: Network) -> MarkerArray:
+    """A pole with its name for every mast, and stretches as lines along their tracks."""
+    array = MarkerArray(markers=_lines(drawing.stretches, network))
+    for number, mast in enumerate(drawing.masts):
+        for kind, text in ((Marker.CYLINDER, ""), (Marker.TEXT_VIEW_FACING, mast.name)):
             marker = Marker(ns="masts" if not text else "names", id=number, type=kind, text=text)
             marker.header.frame_id = "map"
-            marker.pose.position.x, marker.pose.position.y, marker.pose.position.z = position_m
+            place = marker.pose.position
+            place.x, place.y, place.z = mast.position_m
             marker.pose.orientation.w = 1.0
             marker.scale.x = marker.scale.y = 1.0
             marker.scale.z = 6.0
@@ -61,18 +58,19 @@ def markers(
     return array
 
 
-def _zone_lines(zones: Sequence[ZoneExtent], network: Network) -> list[Marker]:
-    """A line for every zone in the colour of its channel pair."""
-    channels = sorted({zone.downlink_channel for zone in zones})
+def _lines(stretches: Sequence[Stretch], network: Network) -> list[Marker]:
+    """A line for every stretch, in the colour of its group."""
+    groups = sorted({stretch.group for stretch in stretches})
     lines = []
-    for number, zone in enumerate(zones):
-        count = max(2, round((zone.end_m - zone.start_m) / STEP_M) + 1)
-        pose = network.tracks[zone.track].pose(np.linspace(zone.start_m, zone.end_m, count))
+    for number, stretch in enumerate(stretches):
+        start_m, end_m = stretch.start_m, stretch.end_m
+        count = max(2, round((end_m - start_m) / STEP_M) + 1)
+        pose = network.tracks[stretch.track].pose(np.linspace(start_m, end_m, count))
         line = Marker(ns="zones", id=number, type=Marker.LINE_STRIP)
         line.header.frame_id = "map"
         line.pose.orientation.w = 1.0
         line.scale.x = 3.0
-        colour = PAIR_COLOURS[channels.index(zone.downlink_channel) % len(PAIR_COLOURS)]
+        colour = PAIR_COLOURS[groups.index(stretch.group) % len(PAIR_COLOURS)]
         line.color.r, line.color.g, line.color.b = colour
         line.color.a = 1.0
         line.points = [

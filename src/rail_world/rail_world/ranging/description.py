@@ -34,16 +34,6 @@ class StationAntenna(_Frozen):
     reach_m: float = Field(gt=0.0, description="distance past which nothing is heard")
 
 
-class ZoneExtent(_Frozen):
-    """Where a zone lies on its track; only what draws it needs to know."""
-
-    zone: str
-    track: str
-    start_m: float
-    end_m: float
-    downlink_channel: Channel
-
-
 class Fault(_Frozen):
     """Something that goes wrong in the radio, from and to a simulated time."""
 

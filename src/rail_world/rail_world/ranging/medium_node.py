@@ -23,8 +23,9 @@ from rail_msgs_py.topics.ranging import LINKS, VRS_RX, VRS_TX, WRS_RX, WRS_TX
 from rail_msgs_py.topics.tick import DONE
 from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.waveform import BlockReader, RepeatedBlock, Waveform, silence
-from rail_world.world_file import read_world_file
+from rail_world.media import read_part
 
+from .description import RadioDescription
 from .medium import Paths, RadioMedium, Reception, TrainAntennas
 
 WATCH_PERIOD_S = 0.1
@@ -56,8 +57,8 @@ class RadioMediumNode(CorridorNode):
             "radio_medium", namespace, context=context, parameters=parameters, services=services
         )
         self._p = declare(self, RadioMediumParameters)
-        described = read_world_file(self._p.world_file)
-        radio = described.radio
+        described, part = read_part(self._p.world_file, "ranging", RadioDescription)
+        radio = part
         self._tick_ns = described.tick_ns
         self._radio = radio
         self._medium = RadioMedium(radio, described.seed)

@@ -17,15 +17,16 @@ from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import figures_from_cdr
 from rail_msgs_py.topics.tick import DONE
 from rail_msgs_py.topics.track_code import CIRCUIT_RX, CIRCUIT_TX, CODE_RX
 from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.waveform import BlockReader, Waveform
-from rail_world.world_file import read_world_file
+from rail_world.media import read_part
 
+from .description import RailDescription
 from .medium import RailMedium, TrainsOnRails
 
 _STATE_PORT = "state"
@@ -56,18 +57,16 @@ class RailMediumNode(CorridorNode):
             "rail_medium", namespace, context=context, parameters=parameters, services=services
         )
         self._p = declare(self, RailMediumParameters)
-        described = read_world_file(self._p.world_file)
-        if described.rails is None:
-            raise ParameterError(f"world_file: {self._p.world_file}: describes no rails")
-        self._rails = described.rails
+        described, part = read_part(self._p.world_file, "track_code", RailDescription)
+        self._rails = part
         self._tick_ns = described.tick_ns
-        self._medium = RailMedium(described.rails, described.seed, described.tick_s)
+        self._medium = RailMedium(part, described.seed, described.tick_s)
         self._lengths_m = np.array([train.vehicle.length_m for train in described.trains])
         self._trains = [train.name for train in described.trains]
         self._ports: list[str] = []
         self._circuit_out: list[Callable[[bytes], None]] = []
         owners: dict[str, str] = {}
-        for circuit in described.rails.circuits:
+        for circuit in part.circuits:
             port = CIRCUIT_TX.name(circuit=circuit.name)
             owners[port] = CIRCUIT_TX.owner(circuit=circuit.name)
             self._ports.append(port)

@@ -18,7 +18,7 @@ from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
@@ -31,8 +31,9 @@ from rail_msgs_py.topics.train_bus import (
     REFLECTOMETER_TX,
 )
 from rail_msgs_py.waveform import Waveform, silence
-from rail_world.world_file import read_world_file
+from rail_world.media import read_part
 
+from .description import BusDescription
 from .medium import BusMedium, bus_media
 
 _CLOCK_PORT = "clock"
@@ -75,14 +76,12 @@ class BusMediumNode(CorridorNode):
             "bus_medium", namespace, context=context, parameters=parameters, services=services
         )
         self._p = declare(self, BusMediumParameters)
-        described = read_world_file(self._p.world_file)
-        if described.bus is None:
-            raise ParameterError(f"world_file: {self._p.world_file}: describes no train bus")
-        self._rate_hz = described.bus.sample_rate_hz
+        described, part = read_part(self._p.world_file, "train_bus", BusDescription)
+        self._rate_hz = part.sample_rate_hz
         self._tick_ns = described.tick_ns
         owners: dict[str, str] = {}
         self._trains: list[_Train] = []
-        for name, medium in bus_media(described.bus, described.seed).items():
+        for name, medium in bus_media(part, described.seed).items():
             ends = [BUS_TX.name(train=name, end=end) for end in ("head", "tail")]
             probe = REFLECTOMETER_TX.name(train=name)
             for port, end in zip(ends, ("head", "tail"), strict=True):
@@ -104,7 +103,7 @@ class BusMediumNode(CorridorNode):
         self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
         self.stream_in(CLOCK, self._on_clock)
         self._links = self.publisher(BUS_LINKS).publish
-        names = tuple(bus.train for bus in described.bus.trains)
+        names = tuple(bus.train for bus in part.trains)
         self._links_table = TableWriter(names, BUS_LINKS.columns)
         self._done = self.stream_out(DONE, node=self.get_fully_qualified_name())
         self.announce_when_connected()

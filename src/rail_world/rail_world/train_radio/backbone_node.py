@@ -17,7 +17,7 @@ from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
@@ -30,10 +30,12 @@ from rail_msgs_py.topics.train_radio import (
     UP_TELEGRAMS,
 )
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
-from rail_world.world_file import read_world_file
+from rail_world.media import read_part
 
 from .backbone import Backbone, Carried
+from .description import CbtcDescription
 from .frame_threats import Threat
+from .threat_description import ThreatsDescription
 
 _CLOCK_PORT, _CARRIED_PORT = "clock", "carried up"
 _CONTROLLER = "/wayside/zone_controller"
@@ -69,12 +71,11 @@ class BackboneNode(CorridorNode):
             "backbone", namespace, context=context, parameters=parameters, services=services
         )
         p = declare(self, BackboneParameters)
-        described = read_world_file(p.world_file)
-        if described.cbtc is None:
-            raise ParameterError(f"world_file: {p.world_file}: describes no train radio")
-        bases = tuple(base.name for base in described.cbtc.base_stations)
+        described, part = read_part(p.world_file, "train_radio", CbtcDescription)
+        bases = tuple(base.name for base in part.base_stations)
+        threats = described.part("threats", ThreatsDescription)
         bits = np.random.Philox(np.random.SeedSequence([described.seed, _THREAT_STREAM]))
-        self._backbone = Backbone(bases, described.threats, np.random.Generator(bits))
+        self._backbone = Backbone(bases, threats.periods, np.random.Generator(bits))
         # A tick has two legs: up when the base stations have been heard, down when the controller
         # has. The second begins after the first, and the next tick after both.
         self._up: TickInbox[Telegrams | None] = TickInbox([_CLOCK_PORT, *bases])

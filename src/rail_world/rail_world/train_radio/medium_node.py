@@ -17,7 +17,7 @@ from rail_msgs_py.failures import TickWatch
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.parameters import declare, parameter
 from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter, figures_from_cdr
 from rail_msgs_py.topics.tick import DONE
@@ -30,8 +30,9 @@ from rail_msgs_py.topics.train_radio import (
 )
 from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
-from rail_world.world_file import read_world_file
+from rail_world.media import read_part
 
+from .description import CbtcDescription
 from .medium import Burst, CbtcMedium, Links
 
 _STATE_PORT = "state"
@@ -63,10 +64,8 @@ class CbtcMediumNode(CorridorNode):
             "cbtc_medium", namespace, context=context, parameters=parameters, services=services
         )
         self._p = declare(self, CbtcMediumParameters)
-        described = read_world_file(self._p.world_file)
-        if described.cbtc is None:
-            raise ParameterError(f"world_file: {self._p.world_file}: describes no train radio")
-        self._radio = radio = described.cbtc
+        described, part = read_part(self._p.world_file, "train_radio", CbtcDescription)
+        self._radio = radio = part
         self._tick_ns = described.tick_ns
         self._medium = CbtcMedium(radio, described.seed, described.tick_s)
         owners: dict[str, str] = {}

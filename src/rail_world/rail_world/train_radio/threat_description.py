@@ -45,6 +45,12 @@ class ThreatPeriod(Description):
         return self.from_s <= time_s < self.to_s
 
 
+class ThreatsDescription(Description):
+    """What an intruder does to the frames on the backbone."""
+
+    periods: tuple[ThreatPeriod, ...]
+
+
 def rates_at(periods: Iterable[ThreatPeriod], time_s: float) -> tuple[ThreatRates, float]:
     """Rates at a simulated time [s], and the longest delay [s].
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rail_corridor.equipment.ranging.calibration import BENCH_SNR, calibrate
-from rail_corridor.scenario.sections import TransponderPlan
+from rail_corridor.equipment.ranging.section import TransponderPlan
 from rail_signals.ranging.bounds import tone_phase_variance_bound
 from rail_signals.ranging.phase_range import range_per_radian_m
 from rail_signals.ranging.signal import RangingSignal

@@ -8,14 +8,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.equipment.ranging.report import HANDOVER_DEPTH_M, train_metrics
-from rail_corridor.report.run_data import FloatArray, Recording
-from rail_corridor.scenario.model import load_scenario
-from rail_msgs_py.topics.ranging import LINKS
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import run_data_of
+from rail_corridor.run_data import FloatArray, RunData
+from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.world import STATE
 
 SCENARIO = load_scenario("plain_line")
-LAYOUT = SCENARIO.layout
+LAYOUT = layout_of(SCENARIO)
 SPEED_MPS = 20.0
 SNR = 1e3
 
@@ -25,10 +27,10 @@ def run(
     channel_at: Callable[[float], int],
     error_m: FloatArray | float = 0.0,
     known: FloatArray | None = None,
-) -> Recording:
+) -> RunData:
     """Return the recording of one train along the straight line, 0.1 s apart."""
     count = len(path_m)
-    made = Recording(("train_a",), ("main",), channels=2)
+    made = run_data_of(SCENARIO)
     errors_m = np.broadcast_to(error_m, count)
     here = STATE.index
     for tick, way_m in enumerate(path_m):
@@ -36,14 +38,14 @@ def run(
         state[0, [here["path_m"], here["x_m"], here["chainage_m"]]] = way_m
         state[0, here["speed_mps"]] = SPEED_MPS
         state[0, here["on_line"]] = 1.0
-        made.state.put(tick, slice(None), state)
+        made[STATE].put(tick, slice(None), state)
         channel = float(channel_at(float(way_m)))
         links = {"snr_down": SNR, "snr_up": SNR, "downlink_channel": channel}
         values = np.array([[links.get(name, channel + 1.0) for name in LINKS.columns]])
-        made.links.put(tick, slice(None), values)
-        made.channel.put(tick, 0, np.array([channel, channel + 1.0, -50.0, -80.0]))
+        made[LINKS].put(tick, slice(None), values)
+        made[VRS_CHANNEL].put(tick, 0, np.array([channel, channel + 1.0, -50.0, -80.0]))
         variance_m2 = 0.04 if known is None or known[tick] else math.inf
-        made.position.put(tick, 0, np.array([0.0, way_m + errors_m[tick], variance_m2, SPEED_MPS]))
+        made[POSITION].put(tick, 0, np.array([0.0, way_m + errors_m[tick], variance_m2, SPEED_MPS]))
     return made
 
 

@@ -10,15 +10,12 @@ from typing import Any
 import pytest
 
 from rail_corridor.equipment.track_code.nodes import circuits_ahead
+from rail_corridor.equipment.track_code.placement import circuits_of
 from rail_corridor.errors import InputError
-from rail_corridor.run.plan import make_plan
-from rail_corridor.scenario.model import (
-    Scenario,
-    builtin_scenarios,
-    load_scenario,
-    scenario_from_data,
-)
-from rail_corridor.scenario.yaml_file import load_yaml
+from rail_corridor.loading.loader import builtin_scenarios, load_scenario, scenario_from_data
+from rail_corridor.loading.yaml_file import load_yaml
+from rail_corridor.plan.plan import make_plan
+from rail_corridor.scenario.model import Scenario
 
 DATA = load_yaml(builtin_scenarios()["follow_codes"])
 
@@ -32,7 +29,7 @@ def made(**changes: Any) -> Scenario:
 
 def test_circuits_cover_the_track_once_with_carriers_in_turn() -> None:
     scenario = made()
-    circuits = scenario.circuits
+    circuits = circuits_of(scenario)
     assert circuits[0].start_m == 0.0
     assert circuits[-1].end_m == scenario.network.tracks["main"].length_m
     for one, other in itertools.pairwise(circuits):
@@ -45,7 +42,7 @@ def test_a_circuit_has_the_worst_limit_and_gradient_in_it() -> None:
     # Falls by 12 permil from 1200 to 2200 m, 80 km/h from 2350 to 3000 m, circuits of 500 m.
     # The rear of a train is still under what its front has left.
     scenario = made()
-    circuits = scenario.circuits
+    circuits = circuits_of(scenario)
     train_m = max(train.vehicle.length_m for train in scenario.trains)
     falling = [c for c in circuits if c.start_m - train_m < 2200.0 and c.end_m > 1200.0]
     assert {c.gradient_permil for c in falling} == {-12.0}
@@ -59,18 +56,18 @@ def test_a_circuit_knows_those_it_takes_to_stop_twice() -> None:
     scenario = made()
     plan = scenario.track_circuits
     assert plan is not None
-    ahead = circuits_ahead(scenario, plan, scenario.circuits[0])
-    assert [c.name for c in ahead] == [c.name for c in scenario.circuits[1 : 1 + len(ahead)]]
-    fastest_mps = max(c.limit_mps for c in scenario.circuits)
+    ahead = circuits_ahead(scenario, plan, circuits_of(scenario)[0])
+    assert [c.name for c in ahead] == [c.name for c in circuits_of(scenario)[1 : 1 + len(ahead)]]
+    fastest_mps = max(c.limit_mps for c in circuits_of(scenario))
     assert sum(c.length_m for c in ahead) > fastest_mps**2 / plan.braking_mps2
-    assert circuits_ahead(scenario, plan, scenario.circuits[-1]) == []
+    assert circuits_ahead(scenario, plan, circuits_of(scenario)[-1]) == []
 
 
 def test_the_plan_has_a_node_for_every_circuit_and_two_for_every_train(tmp_path: Path) -> None:
     scenario = made()
     plan = make_plan(scenario, tmp_path)
     names = {spec.name for spec in plan.nodes}
-    assert {f"/wayside/{c.name}/track_code" for c in scenario.circuits} <= names
+    assert {f"/wayside/{c.name}/track_code" for c in circuits_of(scenario)} <= names
     assert {"/leader/track_code", "/follower/code_supervision", "/world/rail_medium"} <= names
     (world,) = (spec for spec in plan.nodes if spec.kind == "world")
     assert world.parameters["supervised"] == ("leader", "follower")

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rail_corridor.equipment.track_code.placement import circuits_of
 from rail_corridor.equipment.track_code.report import code_metrics
-from rail_corridor.report.run_data import Recording
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import run_data_of
+from rail_corridor.run_data import RunData
 from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT
 from rail_msgs_py.topics.world import COMMAND, STATE
 
@@ -22,12 +24,12 @@ def recording(
     wrong_at: int | None = None,
     ahead_m: float = 900.0,
     permitted_mps: float = 25.0,
-) -> Recording:
+) -> RunData:
     """Return a run of two trains at one speed, the first ``ahead_m`` before the second."""
-    circuits = tuple(circuit.name for circuit in SCENARIO.circuits)
-    made = Recording(("leader", "follower"), ("main",), 2, circuits)
+    circuits = circuits_of(SCENARIO)
+    made = run_data_of(SCENARIO)
     words = np.arange(len(circuits)) + 100.0
-    ends_m = np.array([circuit.end_m for circuit in SCENARIO.circuits])
+    ends_m = np.array([circuit.end_m for circuit in circuits_of(SCENARIO)])
     history: list[tuple[float, float]] = []
     for tick in range(ticks):
         chainage_m = np.array([ahead_m, 0.0]) + 1.0 + speed_mps * TICK_S * tick
@@ -35,10 +37,10 @@ def recording(
         state[:, STATE.index["chainage_m"]] = state[:, STATE.index["path_m"]] = chainage_m
         state[:, STATE.index["speed_mps"]] = speed_mps
         state[:, STATE.index["on_line"]] = 1.0
-        made.state.put(tick, slice(None), state)
+        made[STATE].put(tick, slice(None), state)
         sent = np.zeros((len(circuits), len(CODE_SENT.columns)))
         sent[:, 0] = words
-        made.sent.put(tick, slice(None), sent)
+        made[CODE_SENT].put(tick, slice(None), sent)
         here = words[np.searchsorted(ends_m, chainage_m, side="right")]
         history.append((float(here[0]), float(here[1])))
         received = np.zeros((2, len(CODE_RECEIVED.columns)))
@@ -47,10 +49,10 @@ def recording(
             received[:, CODE_RECEIVED.columns.index("word")] = history[tick - DELAY]
         if tick == wrong_at:
             received[1, CODE_RECEIVED.columns.index("word")] = 7.0
-        made.received.put(tick, slice(None), received)
+        made[CODE_RECEIVED].put(tick, slice(None), received)
         command = np.zeros((2, len(COMMAND.columns)))
         command[:, 0] = permitted_mps
-        made.command.put(tick, slice(None), command)
+        made[COMMAND].put(tick, slice(None), command)
     return made
 
 
@@ -90,6 +92,6 @@ def test_what_must_not_happen_is_seen() -> None:
 def test_interventions_are_counted_once_each() -> None:
     made = recording()
     for tick in (*range(40, 60), *range(80, 90)):
-        made.command.put(tick, 1, np.array([0.0, 1.0, 1.0, float(tick >= 80)]))
+        made[COMMAND].put(tick, 1, np.array([0.0, 1.0, 1.0, float(tick >= 80)]))
     figures = code_metrics(SCENARIO, made, 1)["atp"]
     assert (figures["interventions"], figures["emergency_brakes"]) == (2, 1)

@@ -9,24 +9,17 @@ import numpy as np
 import pytest
 import yaml
 
-from rail_corridor.equipment.train_bus.fault_section import SIZES, BusFault
-from rail_corridor.equipment.train_bus.nodes import (
-    bus_description,
-    bus_trains,
-    most_traces,
-    place_of_fault,
-)
+from rail_corridor.equipment.train_bus.nodes import most_traces
 from rail_corridor.equipment.train_bus.report import bus_metrics
+from rail_corridor.equipment.train_bus.section import SIZES, BusFault
+from rail_corridor.equipment.train_bus.world import bus_description, bus_trains, place_of_fault
 from rail_corridor.errors import InputError
-from rail_corridor.report.run_data import Recording
-from rail_corridor.run.plan import Plan, make_plan
-from rail_corridor.scenario.model import (
-    Scenario,
-    builtin_scenarios,
-    load_scenario,
-    scenario_from_data,
-)
+from rail_corridor.loading.loader import builtin_scenarios, load_scenario, scenario_from_data
+from rail_corridor.plan.plan import Plan, make_plan, run_data_of
+from rail_corridor.run_data import RunData
+from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.train_bus import BUS_LINK, BUS_LINKS, BUS_STATE
+from rail_msgs_py.topics.world import STATE
 from rail_signals.train_bus.faults import KINDS
 from rail_signals.train_bus.frame import bit_error_rate
 
@@ -174,25 +167,25 @@ def test_what_is_wrong_is_one_line(kind: str) -> None:
     assert str(caught.value).isprintable()
 
 
-def recorded(made: Scenario) -> Recording:
+def recorded(made: Scenario) -> RunData:
     """Twenty ticks: a report in tick 6 (confirmed, worse in 10), losses from tick 12 on."""
-    recording = Recording(("train_a",), ("main",), 4, buses=("train_a",))
+    recording = run_data_of(made)
     link = dict.fromkeys(BUS_LINK.columns, 0.0)
     state = dict.fromkeys(BUS_STATE.columns, np.nan)
     for tick in range(20):
         lost = max(0, tick - 11)
         known = {"sent": tick + 1, "received": tick + 1 - lost, "lost": lost}
         bits = {"bits": 128.0 * (tick + 1), "bit_errors": 2.0 * lost}
-        for record, confirmed in ((recording.bus_head, tick < 15), (recording.bus_tail, True)):
+        for end, confirmed in (("head", tick < 15), ("tail", True)):
             row = link | known | bits | {"other_end": float(confirmed)}
-            record.put(tick, 0, np.array(list(row.values())))
+            recording[BUS_LINK, end].put(tick, 0, np.array(list(row.values())))
         kind = 7.0 if tick >= 6 else 0.0
         row = state | {"measurements": tick + 1.0, "interpretations": 3.0, "kind": kind}
         row |= {"level": 0.0 if tick < 6 else 1.0 if tick < 10 else 2.0}
         row |= {"place_m": 121.5, "size": 5.0 * tick} if kind else {}
-        recording.bus_state.put(tick, 0, np.array(list(row.values())))
-        recording.bus_links.put(tick, 0, np.array([0.1, 8.0, 10.0]))
-        recording.state.put(tick, 0, np.zeros(10))
+        recording[BUS_STATE].put(tick, 0, np.array(list(row.values())))
+        recording[BUS_LINKS].put(tick, 0, np.array([0.1, 8.0, 10.0]))
+        recording[STATE].put(tick, 0, np.zeros(10))
     assert len(BUS_LINKS.columns) == 3
     return recording
 
@@ -228,9 +221,9 @@ def test_the_bus_is_part_of_the_digest_its_truth_is_not() -> None:
     made = scenario(faults=[])
     digest = recorded(made).digest()
     other = recorded(made)
-    other.bus_links.put(3, 0, np.zeros(3))
+    other[BUS_LINKS].put(3, 0, np.zeros(3))
     assert other.digest() == digest
-    for record in (other.bus_head, other.bus_tail, other.bus_state):
+    for record in (other[BUS_LINK, "head"], other[BUS_LINK, "tail"], other[BUS_STATE]):
         record.put(3, 0, np.zeros(record.columns))
         assert other.digest() != digest
         digest = other.digest()

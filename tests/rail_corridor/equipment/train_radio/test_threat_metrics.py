@@ -13,8 +13,9 @@ from rail_corridor.equipment.train_radio.threat_metrics import (
     report_metrics,
     threat_metrics,
 )
-from rail_corridor.report.run_data import Recording
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import run_data_of
+from rail_corridor.run_data import RunData
 from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, REPORTS, STRIKES
 from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
@@ -32,7 +33,8 @@ from rail_world.train_radio.backbone import Backbone
 from rail_world.train_radio.frame_threats import Threat
 from rail_world.train_radio.threat_description import ThreatPeriod
 
-SCENARIO = load_scenario("moving_block")
+_HOSTILE = load_scenario("hostile_network")
+SCENARIO = _HOSTILE.model_copy(update={"trains": _HOSTILE.trains[:2]})
 TICK_S = SCENARIO.tick_s
 BASES = ("b1", "b2")
 STARTS_M = {1: 1000.0, 2: 600.0}
@@ -41,8 +43,8 @@ SPEED_MPS = 4.0
 SECRET = bytes(range(32))
 
 
-def recording() -> Recording:
-    return Recording(("first", "second"), ("main",), 2, cbtc=True, threatened=True)
+def recording() -> RunData:
+    return run_data_of(SCENARIO)
 
 
 def ride(
@@ -50,7 +52,7 @@ def ride(
     ticks: int = 240,
     end: type[SafeChannel] = SafeChannel,
     rate: float = 0.25,
-) -> tuple[Recording, AuthorityDesk]:
+) -> tuple[RunData, AuthorityDesk]:
     """Two trains at a steady speed, the backbone and the desk, without the air between them."""
     draw = np.random.default_rng(7).bytes
     block = MovingBlock(
@@ -83,7 +85,7 @@ def ride(
             mine = [heard[base][n] for base in BASES if n in heard[base]]
             train.tick(now_ns, SPEED_MPS * TICK_S * tick, SPEED_MPS, mine)
             given[n] = train.frame(now_ns, SPEED_MPS)
-            made.atp.put(tick, n - 1, np.array(train.figures(now_ns)))
+            made[ATP_STATE].put(tick, n - 1, np.array(train.figures(now_ns)))
         rows: dict[int, list[tuple[float, ...]]] = {n: [] for n in trains}
         for base, arrived in net.up(now_ns, frames).items():
             for slot, frame in arrived:
@@ -92,19 +94,19 @@ def ride(
                     rows[slot].append((taken.sealed_s, *fields(taken.report)))
         for n, reports in rows.items():
             values = np.array(reports, dtype=float).reshape(-1, len(REPORTS.columns))
-            made.reports.put(tick, n - 1, values)
+            made.events(REPORTS).put(tick, n - 1, values)
         ordered = net.down(now_ns, desk.telegrams(now_ns))
         for n in trains:
-            made.authority.put(tick, n - 1, np.array(desk.given(n, now_ns)))
-        made.state.put(tick, slice(None), np.zeros((2, len(STATE.columns))))
+            made[AUTHORITY].put(tick, n - 1, np.array(desk.given(n, now_ns)))
+        made[STATE].put(tick, slice(None), np.zeros((2, len(STATE.columns))))
         struck = [net.frames, *(net.strikes[threat] for threat in Threat)]
-        made.strikes.put(tick, 0, np.array(struck, dtype=float))
+        made[STRIKES].put(tick, 0, np.array(struck, dtype=float))
     return made, desk
 
 
-def authorities(made: Recording) -> int:
+def authorities(made: RunData) -> int:
     """Forged authorities of both trains."""
-    tables = made.atp.upto(made.ticks), made.authority.upto(made.ticks)
+    tables = made[ATP_STATE].upto(made.ticks), made[AUTHORITY].upto(made.ticks)
     return sum(forged_authorities(TICK_S, *(t[:, index] for t in tables)) for index in range(2))
 
 
@@ -194,30 +196,30 @@ def test_an_authority_is_genuine_if_it_was_given_then(
 def test_a_report_that_the_train_did_not_give(column: str, value: float) -> None:
     made = recording()
     for tick in range(21):
-        made.state.put(tick, slice(None), np.zeros((2, len(STATE.columns))))
+        made[STATE].put(tick, slice(None), np.zeros((2, len(STATE.columns))))
         belief = [0.0, 0.0, 0.0, 1000.0 + tick, 1.0, np.nan, np.inf]
-        made.atp.put(tick, 0, np.array(belief))
+        made[ATP_STATE].put(tick, 0, np.array(belief))
         assert len(belief) == len(ATP_STATE.columns)
     sound = dict.fromkeys(REPORTS.columns, 1.0) | {"segment": 0.0, "length_m": 118.0}
     sound |= {"sealed_s": 4.75, "offset_m": 1019.0, "uncertainty_m": 1.0, "speed_mps": 4.0}
     before = sound | {"sealed_s": 4.25, "offset_m": 1017.0}
     for told, forged in ((sound, 0), (sound | {column: value}, 1)):
         rows = np.array([list(before.values()), list(told.values())])
-        made.reports.put(20, 0, rows)
+        made.events(REPORTS).put(20, 0, rows)
         assert report_metrics(SCENARIO, made, 0) == {"reports_taken": 2, "forged_reports": forged}
 
 
 def test_a_report_from_a_train_that_had_fallen_silent_is_forged() -> None:
     made = recording()
     for tick in range(12):
-        made.state.put(tick, slice(None), np.zeros((2, len(STATE.columns))))
+        made[STATE].put(tick, slice(None), np.zeros((2, len(STATE.columns))))
         if tick < 8:
-            made.atp.put(tick, 0, np.array([0.0, 0.0, 0.0, 1000.0, 1.0, np.nan, np.inf]))
+            made[ATP_STATE].put(tick, 0, np.array([0.0, 0.0, 0.0, 1000.0, 1.0, np.nan, np.inf]))
     row = dict.fromkeys(REPORTS.columns, 1.0) | {"segment": 0.0, "offset_m": 1000.0}
     for tick, forged in ((7, 0), (8, 0), (9, 1)):
         # What was sealed in the tick after the last record may have been sent by a dying train.
         rows = np.array([list((row | {"sealed_s": tick * TICK_S}).values())])
-        made.reports.put(10, 0, rows)
+        made.events(REPORTS).put(10, 0, rows)
         assert report_metrics(SCENARIO, made, 0)["forged_reports"] == forged
 
 
@@ -231,21 +233,21 @@ def test_a_train_that_does_not_know_its_place_gives_no_valid_position() -> None:
     row = dict.fromkeys(REPORTS.columns, 1.0) | {"segment": 0.0, "offset_m": 1000.0}
     for half_m, front_m, valid in ((1.0, 1000.0, 1.0), (np.inf, np.nan, 0.0), (7e3, 1000.0, 0.0)):
         for tick in range(4):
-            made.state.put(tick, slice(None), np.zeros((2, len(STATE.columns))))
-            made.atp.put(tick, 0, np.array([0.0, 0.0, 0.0, front_m, half_m, np.nan, np.inf]))
+            made[STATE].put(tick, slice(None), np.zeros((2, len(STATE.columns))))
+            made[ATP_STATE].put(tick, 0, np.array([0.0, 0.0, 0.0, front_m, half_m, np.nan, np.inf]))
         for told in (0.0, 1.0):
             rows = np.array([list((row | {"sealed_s": TICK_S, "position_valid": told}).values())])
-            made.reports.put(3, 0, rows)
+            made.events(REPORTS).put(3, 0, rows)
             assert report_metrics(SCENARIO, made, 0)["forged_reports"] == (told != valid)
 
 
 def test_ticks_without_a_word_on_reports_or_strikes_are_missing() -> None:
     made, _ = ride((), 10)
     for index in range(2):
-        made.reports.put(12, index, np.zeros((0, len(REPORTS.columns))))
-    for record, rows in ((made.state, 2), (made.links, 2), *((e, 2) for e in made.estimates)):
-        for tick in range(13):
-            record.put(tick, slice(None), np.zeros((rows, record.columns)))
+        made.events(REPORTS).put(12, index, np.zeros((0, len(REPORTS.columns))))
+    for spec, record in zip(made.specs, made.records, strict=True):
+        for tick in range(13) if spec.topic not in (REPORTS, STRIKES) else ():
+            record.put(tick, slice(None), np.zeros((len(spec.rows), spec.width)))
     assert made.missing_ticks == 3  # 10 and 11, and 12 for want of strikes
-    made.strikes.put(12, 0, np.zeros(len(STRIKES.columns)))
+    made[STRIKES].put(12, 0, np.zeros(len(STRIKES.columns)))
     assert made.missing_ticks == 2

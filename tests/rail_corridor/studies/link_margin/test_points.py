@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rail_corridor.equipment.train_radio.nodes import burst_format
-from rail_corridor.scenario.model import Scenario
+from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.studies.link_margin.points import (
     LOSSES_DB,
     SCHEMES,
@@ -45,7 +45,7 @@ def test_every_scheme_has_its_losses() -> None:
 
 @pytest.mark.parametrize("quick", [True, False])
 def test_the_stretch_is_weak_by_the_loss_and_by_nothing_else(quick: bool) -> None:
-    found = (Scenario.model_validate(scenario_data(Point("mrc", x, quick))) for x in (20.0, 33.0))
+    found = (parse_scenario(scenario_data(Point("mrc", x, quick))) for x in (20.0, 33.0))
     lines = [line_es_n0_db(scenario, 0.3, step_m=45.0) for scenario in found]
     # Abeam of a mast the train is within the mast's walls for two metres.
     weaker = np.isclose(lines[0] - lines[1], 13.0)
@@ -56,7 +56,7 @@ def test_the_stretch_is_weak_by_the_loss_and_by_nothing_else(quick: bool) -> Non
 def test_theory_falls_with_the_level_and_follows_diversity() -> None:
     rates = {}
     for scheme in SCHEMES:
-        plan = Scenario.model_validate(scenario_data(Point(scheme, 30.0))).cbtc
+        plan = parse_scenario(scenario_data(Point(scheme, 30.0))).cbtc
         assert plan is not None
         burst = burst_format(plan)
         told = [theory(scheme, np.full(3, level), burst, 12, 0.25) for level in range(6, 27, 3)]

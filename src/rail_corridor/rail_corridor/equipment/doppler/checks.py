@@ -1,34 +1,24 @@
-"""What positioning on board must agree on with the rest of a scenario."""
+"""What Doppler positioning must agree on with the rest of a scenario."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from rail_corridor.equipment.one_way import check_one_way
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.fault_sections import DeadReference, DetunedReference, WheelSlip
+from rail_corridor.scenario.model import Scenario
 
-if TYPE_CHECKING:
-    from rail_corridor.scenario.model import Scenario
+from .placement import references_of
+from .section import REFERENCES, DeadReference, DetunedReference
 
 
-def check_positioning(scenario: Scenario, train_fields: Sequence[str]) -> None:
-    """Raise InputError for the first thing that does not fit positioning on board."""
+def check_doppler(scenario: Scenario, train_fields: Sequence[str]) -> None:
+    """Raise InputError for the first thing that does not fit Doppler positioning."""
     _check_faults(scenario)
-    plan = scenario.references
-    if plan is None and scenario.localizer is None:
-        return
-    section = "references" if plan is not None else "localizer"
-    for train, field in zip(scenario.trains, train_fields, strict=True):
-        for name, several in (("route", len(train.route) > 1), ("reverse_at", train.reverse_at)):
-            if several:
-                raise InputError(
-                    f"{section} goes with trains that run on one track, one way only",
-                    field=f"{field}.{name}",
-                    value=len(getattr(train, name)),
-                )
+    plan = REFERENCES.of(scenario)
     if plan is None:
         return
+    check_one_way(scenario, train_fields, REFERENCES.name)
     if plan.tones.duration_s > scenario.tick_s:
         raise InputError(
             f"last {plan.tones.duration_s:g} s, longer than a tick of {scenario.tick_s:g} s",
@@ -53,16 +43,11 @@ def check_positioning(scenario: Scenario, train_fields: Sequence[str]) -> None:
 
 
 def _check_faults(scenario: Scenario) -> None:
-    stations = {station.name for station in scenario.reference_stations}
-    trains = {train.name for train in scenario.trains}
+    stations = {station.name for station in references_of(scenario)}
     for index, fault in enumerate(scenario.faults):
         if isinstance(fault, DeadReference | DetunedReference) and fault.station not in stations:
             raise InputError(
                 "there is no such reference station",
                 field=f"faults.{index}.station",
                 value=fault.station,
-            )
-        if isinstance(fault, WheelSlip) and fault.train not in trains:
-            raise InputError(
-                "there is no such train", field=f"faults.{index}.train", value=fault.train
             )

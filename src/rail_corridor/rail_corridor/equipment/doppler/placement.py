@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rail_corridor.scenario.model import Scenario
 from rail_world.line.network import Network
 
-from .section import ReferencePlan
+from .section import REFERENCES, ReferencePlan
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,16 @@ class Reference:
     chainage_m: float
     position_m: tuple[float, float, float]
     slot: int
+
+
+def references_of(scenario: Scenario) -> tuple[Reference, ...]:
+    """Reference stations of a scenario in the order of its tracks; none without the section."""
+    return scenario.derive(_placed)
+
+
+def _placed(scenario: Scenario) -> tuple[Reference, ...]:
+    plan = REFERENCES.of(scenario)
+    return () if plan is None else place_references(scenario.network, plan)
 
 
 def place_references(network: Network, plan: ReferencePlan) -> tuple[Reference, ...]:

@@ -1,15 +1,18 @@
-"""The sections of a scenario on positioning on board: reference stations, localizer."""
+"""The section on reference stations, by whose Doppler shifts trains are located; its faults."""
 
 from __future__ import annotations
 
 import math
 from functools import cached_property
+from typing import Final, Literal
 
 from pydantic import Field, model_validator
 
+from rail_corridor.scenario.faults import TimedFault
+from rail_corridor.scenario.model import Section
 from rail_corridor.scenario.section_fields import Frequency, Power, Whole
 from rail_signals.doppler.tone_plan import TonePlan
-from rail_world.line.description import Description, Number
+from rail_world.line.description import Description, Name, Number
 
 
 class ReferencePlan(Description):
@@ -81,15 +84,24 @@ class ReferencePlan(Description):
         )
 
 
-class LocalizerPlan(Description):
-    """One position on board from all sensors, which trains then run on."""
+class DeadReference(TimedFault):
+    """A reference station that sends nothing."""
 
-    integrity_risk: Number = Field(
-        default=1e-5,
-        ge=1e-9,
-        le=1e-2,
-        description="probability that the error exceeds the protection level",
-    )
-    odometer_error: Number = Field(
-        default=0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' error"
-    )
+    kind: Literal["dead_reference"]
+    station: Name = Field(description="its name: ref1, ref2, ... in the order of the tracks")
+
+
+class DetunedReference(TimedFault):
+    """A reference station whose oscillator is off."""
+
+    kind: Literal["detuned_reference"]
+    station: Name = Field(description="its name: ref1, ref2, ... in the order of the tracks")
+    shift_hz: Number = Field(ge=-2000.0, le=2000.0, description="how far it is off [Hz]")
+
+
+REFERENCES: Final[Section[ReferencePlan | None]] = Section(
+    "references",
+    ReferencePlan | None,
+    "stations for positions by Doppler shifts; null = none",
+    None,
+)

@@ -11,11 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rail_corridor.scenario.sections import TransponderPlan
+from rail_corridor.scenario.model import Scenario
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.ranging.receiver import LineReceiver
 from rail_signals.ranging.signal import RangingSignal, modulate
 from rail_signals.ranging.transponder import calibrate_delay
+
+from .section import SIGNAL, TRANSPONDER, TransponderPlan
 
 BENCH_SNR = 1e4  # 40 dB per sample over the cable
 
@@ -28,6 +30,20 @@ class Transponder:
     trim_s: float
     residual_m: float
     sigma_m: float
+
+
+def transponders_of(scenario: Scenario) -> dict[str, Transponder]:
+    """The unit of every train, by its name."""
+    return scenario.derive(_calibrated)
+
+
+def _calibrated(scenario: Scenario) -> dict[str, Transponder]:
+    seeds = np.random.SeedSequence([scenario.seed, 2]).spawn(max(1, len(scenario.trains)))
+    plan, signal = TRANSPONDER.of(scenario), SIGNAL.of(scenario).signal
+    return {
+        train.name: calibrate(plan, signal, np.random.default_rng(seed))
+        for train, seed in zip(scenario.trains, seeds, strict=False)
+    }
 
 
 def calibrate(

@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from rail_corridor.scenario.model import Scenario
 from rail_corridor.scenario.section_fields import ChannelPair
-from rail_corridor.scenario.sections import ChannelPlan, StationPlan
 from rail_world.line.network import Network
 
 from .fouling import FoulingPoint, find_fouling_point
@@ -29,6 +29,7 @@ from .placing import (
     place_by_hand,
     tracks_in_order,
 )
+from .section import CHANNELS, STATIONS, ChannelPlan, StationPlan
 
 Vector = tuple[float, float, float]
 
@@ -122,6 +123,15 @@ class Layout:
                     return self.place_at(point.track, chainage_m)
         inside = [zone for zone in zones if zone.start_m <= chainage_m]
         return (inside[-1] if inside else zones[0]), chainage_m
+
+
+def layout_of(scenario: Scenario) -> Layout:
+    """Stations and zones of a scenario; InputError if they cannot be placed."""
+    return scenario.derive(_placed)
+
+
+def _placed(scenario: Scenario) -> Layout:
+    return place_stations(scenario.network, STATIONS.of(scenario), CHANNELS.of(scenario))
 
 
 def place_stations(network: Network, plan: StationPlan, channels: ChannelPlan) -> Layout:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.sections import SHORTEST_ZONE_M, StationPlan
 from rail_world.line.network import Network
 
 from .fouling import FoulingPoint
+from .section import SHORTEST_ZONE_M, StationPlan
 
 MOST_ZONES: Final = 1000
 

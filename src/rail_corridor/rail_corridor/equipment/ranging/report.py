@@ -1,22 +1,28 @@
-"""From a recording to figures: ranging against truth and bound, handovers."""
+"""From a run to values: ranging against truth and bound, handovers; their table."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 
-from rail_corridor.report.run_data import FloatArray, Recording
+from rail_corridor.equipment.tables import metres, new_table, percent
+from rail_corridor.run_data import FloatArray, RunData
 from rail_corridor.scenario.model import Scenario
-from rail_msgs_py.topics.ranging import LINKS
+from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.world import STATE
 from rail_signals.ranging.bounds import two_way_range_variance_bound
 
-from .layout import Layout, Zone
+from .layout import Layout, Zone, layout_of
+from .section import SIGNAL
 
+#: Columns of a recorded position.
+POSITION_COLUMNS = ("track_index", "chainage_m", "variance_m2", "speed_mps")
 #: A handover must be done when the train is this far past the station, plus one tick of travel.
 HANDOVER_DEPTH_M = 20.0
 _MIN_SLOPE = 0.05
@@ -36,11 +42,11 @@ class _Run:
     on_line: NDArray[np.bool_]
 
 
-def train_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
+def train_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str, Any]:
     """Report section of one train."""
     run = _run_of(recording, index)
-    zones, along_m = _places_of(scenario.layout, recording.tracks, run)
-    channel = recording.channel.upto(recording.ticks)[:, index, 0]
+    zones, along_m = _places_of(layout_of(scenario), recording.tracks, run)
+    channel = recording[VRS_CHANNEL].upto(recording.ticks)[:, index, 0]
     errors = _position_errors(scenario, recording, index, run, zones, along_m, channel)
     travelled_m = float(np.nansum(np.abs(np.diff(run.path_m)))) if run.path_m.size else 0.0
     return {
@@ -66,16 +72,16 @@ class PositionErrors:
     bound_m2: FloatArray
 
 
-def position_errors(scenario: Scenario, recording: Recording, index: int) -> PositionErrors:
+def position_errors(scenario: Scenario, recording: RunData, index: int) -> PositionErrors:
     """Errors of the positions of one train, and what the links allow."""
     run = _run_of(recording, index)
-    zones, along_m = _places_of(scenario.layout, recording.tracks, run)
-    channel = recording.channel.upto(recording.ticks)[:, index, 0]
+    zones, along_m = _places_of(layout_of(scenario), recording.tracks, run)
+    channel = recording[VRS_CHANNEL].upto(recording.ticks)[:, index, 0]
     return _position_errors(scenario, recording, index, run, zones, along_m, channel)
 
 
-def _run_of(recording: Recording, index: int) -> _Run:
-    state = recording.state.upto(recording.ticks)[:, index]
+def _run_of(recording: RunData, index: int) -> _Run:
+    state = recording[STATE].upto(recording.ticks)[:, index]
     return _Run(
         state[:, STATE.index["path_m"]],
         state[:, STATE.index["track_index"]],
@@ -149,7 +155,7 @@ def handovers(
         elif zone is not confirmed:
             confirmed = zone
         if in_force > 0.0 and before > 0.0 and in_force != before:
-            near = _zones_near(scenario.layout, zone, here, depth_m)
+            near = _zones_near(layout_of(scenario), zone, here, depth_m)
             wrong += int(in_force not in {z.downlink_channel for z in near})
             away_m = min(here - zone.start_m, zone.end_m - here)
             furthest_m = max(away_m, furthest_m or 0.0)
@@ -175,15 +181,15 @@ def _zones_near(layout: Layout, zone: Zone, chainage_m: float, depth_m: float) -
 
 def _position_errors(
     scenario: Scenario,
-    recording: Recording,
+    recording: RunData,
     index: int,
     run: _Run,
     zones: list[Zone | None],
     along_m: FloatArray,
     channel: FloatArray,
 ) -> PositionErrors:
-    position = recording.position.upto(recording.ticks)[:, index]
-    links = recording.links.upto(recording.ticks)[:, index]
+    position = recording[POSITION].upto(recording.ticks)[:, index]
+    links = recording[LINKS].upto(recording.ticks)[:, index]
     known = run.on_line & np.isfinite(position[:, 2])
     route = scenario.network.route(
         list(scenario.trains[index].route), scenario.trains[index].direction
@@ -196,7 +202,7 @@ def _position_errors(
     wrong_track = known & np.isnan(offsets[track])
     for tick in np.flatnonzero(known & ~wrong_track & (track != run.track)):
         name = recording.tracks[track[tick]]
-        claimed, true = scenario.layout.zone_at(name, float(position[tick, 1])), zones[tick]
+        claimed, true = layout_of(scenario).zone_at(name, float(position[tick, 1])), zones[tick]
         assert true is not None
         depth_m = HANDOVER_DEPTH_M + abs(run.speed_mps[tick]) * scenario.tick_s
         wrong_track[tick] = claimed.track != true.track and not _meet(
@@ -206,9 +212,9 @@ def _position_errors(
     return PositionErrors(run.path_m, run.on_line, known, known & ~wrong_track, error_m, bound_m2)
 
 
-def _ranging(recording: Recording, index: int, found: PositionErrors) -> dict[str, Any]:
+def _ranging(recording: RunData, index: int, found: PositionErrors) -> dict[str, Any]:
     """Position by phase ranging against the truth and against what the links allow."""
-    variance_m2 = recording.position.upto(recording.ticks)[:, index, 2]
+    variance_m2 = recording[POSITION].upto(recording.ticks)[:, index, 2]
     error_m, usable, known = found.error_m, found.usable, found.known
     wrong_track = known & ~usable
     with np.errstate(invalid="ignore"):
@@ -241,7 +247,7 @@ def _meet(claimed: Zone, true: Zone, at_station: bool) -> bool:
 
 def _bound_m2(
     scenario: Scenario,
-    recording: Recording,
+    recording: RunData,
     index: int,
     run: _Run,
     zones: list[Zone | None],
@@ -249,7 +255,7 @@ def _bound_m2(
     links: FloatArray,
 ) -> FloatArray:
     """Cramér-Rao bound of the chainage at each tick: that of the range over its slope."""
-    signal = scenario.ranging.signal
+    signal = SIGNAL.of(scenario).signal
     down, up = links[:, LINKS.index["snr_down"]], links[:, LINKS.index["snr_up"]]
     heard = (down > 0.0) & (up > 0.0)
     bound = np.full(len(down), np.inf)
@@ -257,15 +263,15 @@ def _bound_m2(
         down[heard], up[heard], signal.samples, signal.indices[0], signal.tones_hz[0]
     )
     slope = np.full(len(down), np.nan)
-    state = recording.state.upto(recording.ticks)[:, index]
+    state = recording[STATE].upto(recording.ticks)[:, index]
     columns = [STATE.index[name] for name in ("x_m", "y_m", "z_m", "heading_rad")]
     where = state[:, columns]
     ranged = [
-        _ranging_zone(scenario.layout, zone, c) for zone, c in zip(zones, channel, strict=True)
+        _ranging_zone(layout_of(scenario), zone, c) for zone, c in zip(zones, channel, strict=True)
     ]
     for zone in {z.name: z for z in ranged if z is not None}.values():
         ticks = np.array([tick for tick, z in enumerate(ranged) if z is not None and z is zone])
-        line = where[ticks, :3] - np.array(scenario.layout.station(zone.station).position_m)
+        line = where[ticks, :3] - np.array(layout_of(scenario).station(zone.station).position_m)
         ahead = line[:, 0] * np.cos(where[ticks, 3]) + line[:, 1] * np.sin(where[ticks, 3])
         slope[ticks] = ahead / np.sqrt(np.einsum("nk,nk->n", line, line))
     with np.errstate(invalid="ignore"):
@@ -299,3 +305,23 @@ def _ratio(part: int, whole: int) -> float | None:
 
 def _figure(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+def ranging_table(report: Mapping[str, Any]) -> Table:
+    """Handovers and errors of every train."""
+    state = "" if report["complete"] else " (stopped early)"
+    title = f"{report['scenario']}, seed {report['seed']}{state}: position by phase ranging"
+    table = new_table(
+        title, "train", "km", "handovers", "known", "RMSE m", "bound m", "95 % m", "max m"
+    )
+    for name, train in report["trains"].items():
+        ranging, changes = train["phase_ranging"], train["handovers"]
+        problems = [f"{changes[key]} {key}" for key in ("missed", "wrong") if changes[key]]
+        table.add_row(
+            name,
+            f"{train['distance_m'] / 1000.0:.2f}",
+            f"{changes['made']} of {changes['expected']}" + "".join(f", {p}" for p in problems),
+            percent(ranging["availability"]),
+            *(metres(ranging[key]) for key in ("rmse_m", "bound_m", "p95_m", "max_m")),
+        )
+    return table

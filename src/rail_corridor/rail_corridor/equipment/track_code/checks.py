@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.fault_sections import DeadTransmitter, Sanding
+from rail_corridor.scenario.model import Scenario
 
-if TYPE_CHECKING:
-    from rail_corridor.scenario.model import Scenario
+from .placement import circuits_of
+from .section import TRACK_CIRCUITS, DeadTransmitter, Sanding
 
 
 def check_codes(scenario: Scenario, train_fields: Sequence[str]) -> None:
     """Raise InputError for the first thing that does not fit the track circuits."""
-    plan = scenario.track_circuits
+    plan = TRACK_CIRCUITS.of(scenario)
     for index, fault in enumerate(scenario.faults):
         if plan is None and isinstance(fault, Sanding | DeadTransmitter):
             raise InputError(
@@ -47,7 +46,7 @@ def check_codes(scenario: Scenario, train_fields: Sequence[str]) -> None:
 
 
 def _check_faults(scenario: Scenario) -> None:
-    circuits = [circuit.name for circuit in scenario.circuits]
+    circuits = [circuit.name for circuit in circuits_of(scenario)]
     trains = [train.name for train in scenario.trains]
     for index, fault in enumerate(scenario.faults):
         if isinstance(fault, Sanding) and fault.train not in trains:

@@ -4,41 +4,38 @@ from __future__ import annotations
 
 from typing import Any
 
+from rail_corridor.equipment.assumptions import SIGMAS
 from rail_corridor.equipment.node_spec import NodeSpec
+from rail_corridor.equipment.subsystem import PlanContext
 from rail_corridor.scenario.model import Scenario
-from rail_corridor.scenario.sections import TRACK_CODE, TrackCircuitPlan
 
-from .placement import Circuit
-
-RAIL_MEDIUM = "/world/rail_medium"
-#: Distances are allowed to be off by so many standard deviations of the wheels' error.
-_ODOMETER_SIGMAS = 4.0
+from .placement import Circuit, circuits_of
+from .section import PROFILE, TRACK_CIRCUITS, TrackCircuitPlan
 
 
-def code_nodes(scenario: Scenario, world_file: str, timeout_s: float) -> list[NodeSpec]:
+def code_nodes(scenario: Scenario, context: PlanContext) -> list[NodeSpec]:
     """Nodes of the track circuits and of the trains that obey them; none without circuits."""
-    plan = scenario.track_circuits
+    plan, timeout_s = TRACK_CIRCUITS.of(scenario), context.timeout_s
     if plan is None:
         return []
-    medium = {"world_file": world_file, "timeout_s": 2 * timeout_s / 5}
-    nodes = [NodeSpec("rail_medium", RAIL_MEDIUM, "world", medium)]
-    for circuit in scenario.circuits:
+    nodes = [context.medium("rail_medium")]
+    for circuit in circuits_of(scenario):
         parameters = _transmitter(scenario, plan, circuit, timeout_s / 5)
         name = f"/wayside/{circuit.name}/track_code"
         nodes.append(NodeSpec("track_code_transmitter", name, "wayside", parameters))
-    for described in scenario.trains if scenario.supervised else ():
+    for described in scenario.trains:
         train = described.name
         receiver = {
-            "profile": TRACK_CODE,
+            "profile": PROFILE,
             "carriers_hz": plan.carriers_hz,
             "sample_rate_hz": plan.sample_rate_hz,
         }
         supervision = {
             "braking_mps2": plan.braking_mps2,
-            "odometer_error": _ODOMETER_SIGMAS * plan.odometer_error,
-            "localizer": scenario.localizer is not None,
+            "odometer_error": SIGMAS * plan.odometer_error,
             "direction": described.direction,
             "timeout_s": 3 * timeout_s / 5,
+            **context.offers("code_supervision", scenario, train),
         }
         nodes += [
             NodeSpec("track_code_receiver", f"/{train}/track_code", "onboard", receiver),
@@ -53,7 +50,7 @@ def _transmitter(
     ahead = circuits_ahead(scenario, plan, circuit)
     row = [circuit, *ahead]
     return {
-        "profile": TRACK_CODE,
+        "profile": PROFILE,
         "carrier_hz": circuit.carrier_hz,
         "sample_rate_hz": plan.sample_rate_hz,
         "tick_s": scenario.tick_s,
@@ -69,10 +66,10 @@ def _transmitter(
 
 def circuits_ahead(scenario: Scenario, plan: TrackCircuitPlan, circuit: Circuit) -> list[Circuit]:
     """Circuits that matter to the code of one: as far as the fastest train needs to stop, twice."""
-    fastest_mps = max(c.limit_mps for c in scenario.circuits)
+    fastest_mps = max(c.limit_mps for c in circuits_of(scenario))
     enough_m = fastest_mps**2 / plan.braking_mps2
     ahead, reach_m = [], 0.0
-    for other in scenario.circuits:
+    for other in circuits_of(scenario):
         if other.track != circuit.track or other.start_m < circuit.end_m - 1e-6:
             continue
         ahead.append(other)

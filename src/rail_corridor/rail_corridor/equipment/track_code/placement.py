@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rail_corridor.scenario.sections import TrackCircuitPlan
+from rail_corridor.scenario.model import Scenario
 from rail_world.line.network import Network
 from rail_world.line.track import Track
+
+from .section import TRACK_CIRCUITS, TrackCircuitPlan
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,19 @@ class Circuit:
     def length_m(self) -> float:
         """Length along the track [m]."""
         return self.end_m - self.start_m
+
+
+def circuits_of(scenario: Scenario) -> tuple[Circuit, ...]:
+    """Track circuits of a scenario in the order of its tracks; none without the section."""
+    return scenario.derive(_placed)
+
+
+def _placed(scenario: Scenario) -> tuple[Circuit, ...]:
+    plan = TRACK_CIRCUITS.of(scenario)
+    if plan is None:
+        return ()
+    longest_m = max((train.vehicle.length_m for train in scenario.trains), default=0.0)
+    return place_circuits(scenario.network, plan, longest_m)
 
 
 def place_circuits(

@@ -1,33 +1,38 @@
-"""From a recording to figures: track codes sent and understood, and what came of them."""
+"""From a run to values: track codes sent and understood, and what came of them."""
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 
 from rail_corridor.equipment.supervision_report import supervision_metrics, trains_ahead
-from rail_corridor.report.run_data import FloatArray, Recording
+from rail_corridor.equipment.tables import new_table
+from rail_corridor.run_data import FloatArray, RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT
 from rail_msgs_py.topics.world import STATE
+
+from .placement import circuits_of
 
 #: A valid message may be as old as the longest way through the receiver [s].
 OLDEST_S = 8.0
 
 
-def code_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
+def code_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str, Any]:
     """Sections ``track_code`` and ``atp`` of one train."""
     ticks = recording.ticks
-    state = recording.state.upto(ticks)
+    state = recording[STATE].upto(ticks)
     on_line = state[:, index, STATE.index["on_line"]] > 0.0
     circuit = circuit_of(scenario, recording, state[:, index])
-    sent = recording.sent.upto(ticks)[:, :, CODE_SENT.index["word"]]
+    sent = recording[CODE_SENT].upto(ticks)[:, :, CODE_SENT.index["word"]]
     here = np.where(on_line, sent[np.arange(ticks), circuit], np.nan)
-    received = recording.received.upto(ticks)[:, index]
+    received = recording[CODE_RECEIVED].upto(ticks)[:, index]
     return {
         "track_code": _codes(scenario.tick_s, on_line, circuit, here, received),
         "atp": supervision_metrics(scenario, recording, index, on_line)
@@ -35,12 +40,12 @@ def code_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[s
     }
 
 
-def circuit_of(scenario: Scenario, recording: Recording, state: FloatArray) -> NDArray[np.intp]:
+def circuit_of(scenario: Scenario, recording: RunData, state: FloatArray) -> NDArray[np.intp]:
     """Index of the circuit that the front of a train is in, at each tick."""
     found = np.zeros(len(state), dtype=np.intp)
     for track, name in enumerate(recording.tracks):
-        numbers = [i for i, circuit in enumerate(scenario.circuits) if circuit.track == name]
-        starts_m = [scenario.circuits[i].start_m for i in numbers]
+        numbers = [i for i, circuit in enumerate(circuits_of(scenario)) if circuit.track == name]
+        starts_m = [circuits_of(scenario)[i].start_m for i in numbers]
         there = state[:, STATE.index["track_index"]] == track
         places = (
             np.searchsorted(starts_m, state[there, STATE.index["chainage_m"]], side="right") - 1
@@ -89,14 +94,14 @@ def _codes(
 
 def _entered_occupied(
     scenario: Scenario,
-    recording: Recording,
+    recording: RunData,
     index: int,
     on_line: NDArray[np.bool_],
     circuit: NDArray[np.intp],
 ) -> int:
     """Circuits that the front of a train entered while another train was in them."""
-    starts_m = np.array([c.start_m for c in scenario.circuits])
-    ends_m = np.array([c.end_m for c in scenario.circuits])
+    starts_m = np.array([c.start_m for c in circuits_of(scenario)])
+    ends_m = np.array([c.end_m for c in circuits_of(scenario)])
     enters = on_line.copy()
     enters[1:] &= (circuit[1:] != circuit[:-1]) & on_line[:-1]
     enters[:1] = False
@@ -105,3 +110,29 @@ def _entered_occupied(
         inside = ahead & (rear_m < ends_m[circuit]) & (front_m > starts_m[circuit])
         entered += int(np.count_nonzero(enters & inside))
     return entered
+
+
+def code_table(trains: Mapping[str, Any]) -> Table | None:
+    """What trains understood from the rails, and what supervision did; None without circuits."""
+    obeying = {name: train for name, train in trains.items() if "track_code" in train}
+    if not obeying:
+        return None
+    table = new_table(
+        "codes understood, and supervision",
+        *("train", "codes", "wrong", "valid", "after s", "braked", "over s", "entered", "gap m"),
+    )
+    for name, train in obeying.items():
+        code, atp = train["track_code"], train["atp"]
+        margin_m = atp["margin_min_m"]
+        table.add_row(
+            name,
+            f"{code['decoded']}/{code['sent']}",
+            str(code["wrong"]),
+            "-" if code["availability"] is None else f"{100.0 * code['availability']:.0f} %",
+            "-" if code["latency_s"] is None else f"{code['latency_s']:.2f}",
+            str(atp["interventions"]),
+            f"{atp['overspeed_s']:.1f}",
+            str(atp["entered_occupied"]),
+            "-" if margin_m is None else f"{margin_m:.0f}",
+        )
+    return table

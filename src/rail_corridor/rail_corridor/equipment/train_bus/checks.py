@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from rail_corridor.errors import InputError
+from rail_corridor.scenario.model import Scenario
 from rail_onboard.train_bus.message import PAYLOAD_BYTES
 from rail_signals.train_bus.frame import BusFrameFormat
 from rail_signals.train_bus.profile import bus_profile_names
 from rail_signals.train_bus.train import train_consist
 
-from .fault_section import BusFault
-from .nodes import bus_trains, most_traces
-from .section import BusPlan
-
-if TYPE_CHECKING:
-    from rail_corridor.scenario.model import Scenario
+from .nodes import most_traces
+from .section import TRAIN_BUS_SECTION, BusFault, BusPlan
+from .world import bus_trains
 
 
 def check_bus(scenario: Scenario) -> None:
     """Raise InputError for the first thing that does not fit the train bus."""
-    plan = scenario.train_bus
+    plan = TRAIN_BUS_SECTION.of(scenario)
     faults = [(i, f) for i, f in enumerate(scenario.faults) if isinstance(f, BusFault)]
     if plan is None:
         for index, fault in faults:

@@ -1,31 +1,35 @@
-"""From a recording to figures: frames of the train bus, and what its monitor reported of it."""
+"""From a run to values: frames of the train bus, and what its monitor reported of it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.table import Table
 
-from rail_corridor.report.run_data import FloatArray, Recording
+from rail_corridor.equipment.tables import new_table
+from rail_corridor.run_data import FloatArray, RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.train_bus import BUS_LINK, BUS_LINKS, BUS_STATE
 from rail_signals.train_bus.faults import KINDS
 from rail_signals.train_bus.frame import bit_error_rate
 
-from .fault_section import BusFault
-from .nodes import bus_fault_of, place_of_fault
+from .section import BusFault
+from .world import bus_fault_of, place_of_fault
 
 
-def bus_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
+def bus_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str, Any]:
     """Section ``train_bus`` of the train that is number `index` of those with a bus."""
     ticks, tick_s = recording.ticks, scenario.tick_s
-    ends = [record.upto(ticks)[:, index] for record in (recording.bus_head, recording.bus_tail)]
-    state = recording.bus_state.upto(ticks)[:, index]
-    links = recording.bus_links.upto(ticks)[:, index]
-    fault = bus_fault_of(scenario, recording.buses[index])
+    ends = [
+        record.upto(ticks)[:, index]
+        for record in (recording[BUS_LINK, "head"], recording[BUS_LINK, "tail"])
+    ]
+    state = recording[BUS_STATE].upto(ticks)[:, index]
+    links = recording[BUS_LINKS].upto(ticks)[:, index]
+    fault = bus_fault_of(scenario, recording[BUS_STATE].rows[index])
     first_loss_s = _first_loss_s(ends, tick_s)
     reports = _reports(scenario, fault, state)
     true = [r for r in reports if fault is not None and r["time_s"] >= fault.from_s]
@@ -115,16 +119,15 @@ def _last(table: FloatArray, column: int) -> float:
     return float(counts[-1]) if counts.size else 0.0
 
 
-def print_buses(trains: dict[str, Any], console: Console) -> None:
-    """Show what the buses carried, and what was reported of them."""
+def bus_table(trains: Mapping[str, Any]) -> Table | None:
+    """What the buses carried, and what was reported of them; None without any."""
     with_bus = {name: train["train_bus"] for name, train in trains.items() if "train_bus" in train}
     if not with_bus:
-        return
-    table = Table(title="train bus, and its monitor", title_justify="left", title_style="bold")
-    headings = ("train", "frames", "lost", "BER", "from s", "fault", "at m", "told")
-    for heading in headings:
-        side = "left" if heading in ("train", "fault") else "right"
-        table.add_column(heading, justify=side, no_wrap=True)  # type: ignore[arg-type]
+        return None
+    table = new_table(
+        "train bus, and its monitor",
+        *("train", "frames", "lost", "BER", "from s", "fault", "at m", "reported s"),
+    )
     for name, bus in with_bus.items():
         last = bus["faults"][-1] if bus["faults"] else None
         rate = bus["bit_error_rate"]
@@ -138,7 +141,7 @@ def print_buses(trains: dict[str, Any], console: Console) -> None:
             "-" if last is None else f"{last['place_m']:.1f}",
             _time(bus["reported_s"]),
         )
-    console.print(table)
+    return table
 
 
 def _time(value: float | None) -> str:

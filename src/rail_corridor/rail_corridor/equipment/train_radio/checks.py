@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.fault_sections import DeadBaseStation, NetworkThreats, TrainStop
+from rail_corridor.scenario.model import Scenario
 from rail_signals.train_radio.slots import RadioSlots
 
 from .nodes import burst_format
-from .section import CbtcPlan
-
-if TYPE_CHECKING:
-    from rail_corridor.scenario.model import Scenario
+from .placement import bases_of
+from .section import CBTC, CbtcPlan, DeadBaseStation, NetworkThreats
 
 
 def check_cbtc(scenario: Scenario, train_fields: Sequence[str]) -> None:
     """Raise InputError for the first thing that does not fit train control by radio."""
-    plan = scenario.cbtc
+    plan = CBTC.of(scenario)
     _check_faults(scenario)
     if plan is None:
         return
-    if scenario.track_circuits is not None:
-        raise InputError(
-            "trains obey either track_circuits or cbtc", field="cbtc", value=plan.scheme
-        )
     if scenario.junctions:
         raise InputError(
             "train control by radio does not go with junctions yet",
@@ -88,15 +81,8 @@ def _check_signal(scenario: Scenario, plan: CbtcPlan) -> None:
 
 
 def _check_faults(scenario: Scenario) -> None:
-    trains = [train.name for train in scenario.trains]
-    bases = [base.name for base in scenario.bases]
+    bases = [base.name for base in bases_of(scenario)]
     for index, fault in enumerate(scenario.faults):
-        if isinstance(fault, TrainStop) and fault.train not in trains:
-            raise InputError(
-                f"there is no such train, they are {', '.join(trains)}",
-                field=f"faults.{index}.train",
-                value=fault.train,
-            )
         if not isinstance(fault, DeadBaseStation | NetworkThreats):
             continue
         if not bases:

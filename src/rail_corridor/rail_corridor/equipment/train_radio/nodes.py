@@ -4,124 +4,42 @@ from __future__ import annotations
 
 import hashlib
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any, Final
 
+from rail_corridor.equipment.assumptions import PLACED_M, SIGMAS
 from rail_corridor.equipment.node_spec import NodeSpec
-from rail_corridor.scenario.fault_sections import DeadBaseStation, NetworkThreats
-from rail_msgs_py.topics.train_radio import BACKBONE
+from rail_corridor.equipment.subsystem import PlanContext
+from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.train_radio.burst import RadioBurstFormat
 from rail_signals.train_radio.space_time_block import scheme
 from rail_signals.train_radio.symbol_mapping import constellation
 from rail_world.line.track import Track
-from rail_world.train_radio.description import BaseStation, CbtcDescription, CbtcFault, LossSection
-from rail_world.train_radio.threat_description import ThreatPeriod
 from rail_world.trains.vehicle import Vehicle
 
-from .placement import Base
-from .section import CbtcPlan
+from .placement import Base, bases_of
+from .section import CBTC, CbtcPlan
+from .world import threats_of
 
-if TYPE_CHECKING:
-    from rail_corridor.scenario.model import Scenario
-
-CBTC_MEDIUM = "/world/cbtc_medium"
-#: Base stations are heard so many of their spacings away; their channels come again after more.
-_REACH_SPACINGS = 1.4
-#: Distances and fixes may be off by so many standard deviations.
-SIGMAS = 4.0
+CBTC_MEDIUM: Final = "/world/cbtc_medium"
 #: How far authorities reach past the end of a track whose trains go on.
-_BEYOND_M = 2000.0
-#: What the dispatcher knows of where a train is when it is put into service [m].
-PLACED_M = 1.0
+_BEYOND_M: Final = 2000.0
 
 
-def cbtc_description(scenario: Scenario) -> CbtcDescription | None:
-    """What the medium of the train radio knows, None without train control by radio."""
-    plan = scenario.cbtc
-    if plan is None:
-        return None
-    antennas = scheme(plan.scheme)
-    sections = [
-        LossSection(
-            kind=loss.kind,
-            track=loss.track,
-            from_m=loss.from_m,
-            to_m=loss.to_m,
-            wall_loss_db=loss.entry_db if loss.kind == "cutting" else None,
-            entry_loss_db=loss.entry_db if loss.kind == "tunnel" else None,
-            loss_db_per_m=loss.db_per_km / 1000.0 if loss.kind == "tunnel" else None,
-        )
-        for loss in plan.losses
-    ]
-    faults = [
-        CbtcFault(
-            kind="dead_base_station",
-            base_station=fault.base,
-            from_s=fault.from_s,
-            to_s=fault.to_s,
-        )
-        for fault in scenario.faults
-        if isinstance(fault, DeadBaseStation)
-    ]
-    return CbtcDescription(
-        base_stations=tuple(
-            BaseStation(
-                name=base.name,
-                track=base.track,
-                chainage_m=base.chainage_m,
-                position_m=base.position_m,
-                channel=base.channel,
-            )
-            for base in scenario.bases
-        ),
-        trains=tuple(train.name for train in scenario.trains),
-        tracks=tuple(scenario.tracks),
-        downlink_hz=plan.downlinks_hz,
-        uplink_hz=plan.uplinks_hz,
-        sample_rate_hz=plan.symbol_rate_hz * plan.samples_per_symbol,
-        # The code is the same both ways.
-        base_antennas=max(antennas.transmit, antennas.receive),
-        train_antennas=max(antennas.transmit, antennas.receive),
-        base_power_dbm=plan.base_power_dbm,
-        train_power_dbm=plan.train_power_dbm,
-        noise_figure_db=plan.noise_figure_db,
-        path_loss_exponent=plan.path_loss_exponent,
-        reach_m=_REACH_SPACINGS * plan.base_spacing_m,
-        rician_factor=plan.rician_factor,
-        snr_offset_db=-plan.extra_loss_db,
-        sections=tuple(sections),
-        faults=tuple(faults),
-    )
-
-
-def threat_periods(scenario: Scenario) -> tuple[ThreatPeriod, ...]:
-    """What an intruder does to the frames on the backbone; without any there is no backbone."""
-    return tuple(
-        ThreatPeriod(**fault.model_dump(exclude={"kind"}))
-        for fault in scenario.faults
-        if isinstance(fault, NetworkThreats)
-    )
-
-
-def cbtc_nodes(scenario: Scenario, world_file: str, timeout_s: float) -> list[NodeSpec]:
+def cbtc_nodes(scenario: Scenario, context: PlanContext) -> list[NodeSpec]:
     """Nodes of train control by radio; none without it."""
-    plan = scenario.cbtc
+    plan, timeout_s = CBTC.of(scenario), context.timeout_s
     if plan is None:
         return []
     radio = radio_parameters(scenario, plan)
-    medium = {
-        "world_file": world_file,
-        "burst_samples": burst_format(plan).samples,
-        "timeout_s": 2 * timeout_s / 5,
-    }
-    nodes = [NodeSpec("cbtc_medium", CBTC_MEDIUM, "world", medium)]
-    threatened = bool(threat_periods(scenario))
+    nodes = [context.medium("cbtc_medium", burst_samples=burst_format(plan).samples)]
+    threatened = bool(threats_of(scenario).periods)
     if threatened:
         # It waits longer than the medium for base stations, and longer than the controller for it.
         waits = {"timeout_s": timeout_s / 2, "controller_timeout_s": 4 * timeout_s / 5}
-        nodes.append(NodeSpec("backbone", BACKBONE, "world", {"world_file": world_file} | waits))
-    for base in scenario.bases:
+        nodes.append(context.medium("backbone", **waits))
+    for base in bases_of(scenario):
         parameters = radio | _base(plan, base, timeout_s / 5) | {"backbone": threatened}
         nodes.append(
             NodeSpec("cbtc_base_station", f"/wayside/{base.name}/cbtc", "wayside", parameters)
@@ -129,6 +47,7 @@ def cbtc_nodes(scenario: Scenario, world_file: str, timeout_s: float) -> list[No
     for number, train in enumerate(scenario.trains, start=1):
         parameters = radio | _on_board(plan, number, timeout_s / 5)
         protection = _atp(scenario, plan, number, timeout_s)
+        protection |= context.offers("atp", scenario, train.name)
         nodes += [
             NodeSpec("cbtc_radio", f"/{train.name}/cbtc_radio", "onboard", parameters),
             NodeSpec("atp", f"/{train.name}/atp", "onboard", protection),
@@ -203,7 +122,6 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
         "traction_mps2": Vehicle(train.vehicle).traction_mps2(0.0),
         "odometer_error": SIGMAS * plan.odometer_error,
         "authority_timeout_s": plan.timeout_s,
-        "localizer": scenario.localizer is not None,
         "secret": secret(scenario),
         "seed": scenario.seed,
         "tick_s": scenario.tick_s,
@@ -219,7 +137,7 @@ def steepest_fall_permil(track: Track) -> float:
 
 def controller_parameters(scenario: Scenario) -> dict[str, Any]:
     """What the zone controller needs to give authorities; nothing without base stations."""
-    plan = scenario.cbtc
+    plan = CBTC.of(scenario)
     if plan is None:
         return {}
     tracks = scenario.network.tracks
@@ -229,8 +147,8 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
     # Where trains go on to the next control area, the track does not end for them.
     beyond_m = _BEYOND_M if all(train.leaves_on_arrival for train in by_departure) else 0.0
     return {
-        "bases": tuple(base.name for base in scenario.bases),
-        "backbone": bool(threat_periods(scenario)),
+        "bases": tuple(base.name for base in bases_of(scenario)),
+        "backbone": bool(threats_of(scenario).periods),
         "segments": tuple(tracks),
         "segment_lengths_m": tuple(track.length_m + beyond_m for track in tracks.values()),
         "limit_counts": tuple(len(steps) for steps in limits.values()),

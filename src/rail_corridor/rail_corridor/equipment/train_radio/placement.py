@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rail_corridor.scenario.model import Scenario
 from rail_world.line.network import Network
 
-from .section import CbtcPlan
+from .section import CBTC, CbtcPlan
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,16 @@ class Base:
     chainage_m: float
     position_m: tuple[float, float, float]
     channel: int
+
+
+def bases_of(scenario: Scenario) -> tuple[Base, ...]:
+    """Base stations of a scenario in the order of its tracks; none without the section."""
+    return scenario.derive(_placed)
+
+
+def _placed(scenario: Scenario) -> tuple[Base, ...]:
+    plan = CBTC.of(scenario)
+    return () if plan is None else place_bases(scenario.network, plan)
 
 
 def place_bases(network: Network, plan: CbtcPlan) -> tuple[Base, ...]:

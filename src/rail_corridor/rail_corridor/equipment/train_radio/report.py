@@ -1,15 +1,19 @@
-"""From a recording to figures: the train radio, its authorities, and what came of them."""
+"""From a run to values: the train radio, its authorities, and what came of them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 
 from rail_corridor.equipment.supervision_report import supervision_metrics
-from rail_corridor.report.run_data import FloatArray, Recording
+from rail_corridor.equipment.tables import new_table
+from rail_corridor.equipment.train_radio.section import CBTC
+from rail_corridor.run_data import FloatArray, RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, CBTC_LINKS, RADIO_LINK
 from rail_msgs_py.topics.world import STATE
@@ -20,15 +24,15 @@ from .threat_metrics import forged_authorities, report_metrics
 PASSED_AT: Final = tuple(tenth / 10.0 for tenth in range(1, 10))
 
 
-def cbtc_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, Any]:
+def cbtc_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str, Any]:
     """Sections ``cbtc`` and ``atp`` of one train."""
     ticks = recording.ticks
-    mine = recording.state.upto(ticks)[:, index]
+    mine = recording[STATE].upto(ticks)[:, index]
     on_line = mine[:, STATE.index["on_line"]] > 0.0
-    atp = recording.atp.upto(ticks)[:, index]
-    given = recording.authority.upto(ticks)[:, index]
-    radio = recording.radio.upto(ticks)[:, index]
-    links = recording.cbtc_links.upto(ticks)[:, index]
+    atp = recording[ATP_STATE].upto(ticks)[:, index]
+    given = recording[AUTHORITY].upto(ticks)[:, index]
+    radio = recording[RADIO_LINK].upto(ticks)[:, index]
+    links = recording[CBTC_LINKS].upto(ticks)[:, index]
     front_m = mine[:, STATE.index["chainage_m"]]
     end_m = _held(
         atp[:, ATP_STATE.index["end_of_authority_m"]], atp[:, ATP_STATE.index["accepted"]]
@@ -58,7 +62,7 @@ def _passed(
     finds reports and ranges in disagreement; the train brakes, and until it stands it is not
     counted as past its end.
     """
-    plan = scenario.cbtc
+    plan = CBTC.of(scenario)
     braking_mps2 = plan.emergency_mps2 if plan else 1.0
     delay_s = 3.0 * scenario.tick_s
     passed = withdrawn = 0
@@ -101,7 +105,7 @@ def _link(
     changes = (channel[1:] != channel[:-1]) & (channel[:-1] > 0)
     snr = links[on_line, CBTC_LINKS.index["snr_down"]]
     snr = snr[snr > 0.0]
-    lost_s = np.count_nonzero(age_s > scenario.cbtc.timeout_s) if scenario.cbtc else 0
+    lost_s = np.count_nonzero(age_s > CBTC.of(scenario).timeout_s) if CBTC.of(scenario) else 0
     return {
         "frames": int(accepted + lost),
         "lost": int(lost),
@@ -158,3 +162,28 @@ def _location(
         "uncertainty_m": float(np.median(half_m[known])),
         "mislocated": int(np.count_nonzero(error_m[known] > half_m[known])),
     }
+
+
+def authority_table(trains: Mapping[str, Any]) -> Table | None:
+    """What the train radio brought, and what supervision did; None without it."""
+    obeying = {name: train for name, train in trains.items() if "cbtc" in train}
+    if not obeying:
+        return None
+    table = new_table(
+        "movement authorities by radio, and supervision",
+        *("train", "frames", "lost", "age 95 % s", "braked", "emerg.", "passed", "gap m"),
+    )
+    for name, train in obeying.items():
+        link, atp = train["cbtc"], train["atp"]
+        margin_m, age_s = atp["margin_min_m"], link["age_p95_s"]
+        table.add_row(
+            name,
+            str(link["frames"]),
+            f"{100.0 * link['lost'] / link['frames']:.1f} %" if link["frames"] else "-",
+            "-" if age_s is None else f"{age_s:.2f}",
+            str(atp["interventions"]),
+            str(atp["emergency_brakes"]),
+            str(atp["passed_authority"]),
+            "-" if margin_m is None else f"{margin_m:.0f}",
+        )
+    return table

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import Field, model_validator
 
+from rail_corridor.scenario.faults import TimedFault
+from rail_corridor.scenario.model import Section
 from rail_corridor.scenario.section_fields import Frequency, Power, Whole
 from rail_world.line.description import Chainage, Description, Name, Number
+from rail_world.train_radio.threat_description import LONGEST_DELAY_S, LongestDelay, Rate, Threats
 
 
 class LossPlan(Description):
@@ -112,3 +115,32 @@ class CbtcPlan(Description):
     def uplinks_hz(self) -> dict[int, float]:
         """Uplink carrier of each channel [Hz]."""
         return {n: carrier_hz + self.duplex_hz for n, carrier_hz in self.downlinks_hz.items()}
+
+
+class DeadBaseStation(TimedFault):
+    """A base station of the train radio that neither sends nor hears."""
+
+    kind: Literal["dead_base_station"]
+    base: Name = Field(description="its name: base1, base2, ... in the order of the tracks")
+
+
+class NetworkThreats(TimedFault):
+    """An intruder between zone controller and base stations: threats of EN 50159 to frames.
+
+    Where periods overlap, they strike independently of each other.
+    """
+
+    kind: Literal["threat"]
+    threats: Threats = Field(
+        description="some of repetition, deletion, insertion, resequencing, corruption, delay, "
+        "masquerade"
+    )
+    rate: Rate = Field(description="probability of each for a frame, either way")
+    longest_delay_s: LongestDelay = Field(
+        default=LONGEST_DELAY_S, description="a delay is drawn evenly from 0 to this [s]"
+    )
+
+
+CBTC: Final[Section[CbtcPlan | None]] = Section(
+    "cbtc", CbtcPlan | None, "train control by radio, which trains obey; null = none", None
+)

@@ -1,12 +1,13 @@
-"""From a recording to figures: threats on the network, and whether any end believed them."""
+"""From a run to values: threats on the network, and whether any end believed them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from rail_corridor.report.run_data import FloatArray, Recording
+from rail_corridor.run_data import FloatArray, RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, REPORTS, STRIKES
 from rail_msgs_py.train_radio.fixed_point import covering
@@ -18,13 +19,29 @@ _SAME_S = 2e-6
 _ROUNDING_M = 0.011
 
 
-def threat_metrics(recording: Recording) -> dict[str, Any]:
+def threat_metrics(recording: RunData) -> dict[str, Any]:
     """Section ``threats``: frames carried by the backbone, and how often each threat struck."""
-    table = recording.strikes.upto(recording.ticks)[:, 0]
+    table = recording[STRIKES].upto(recording.ticks)[:, 0]
     table = table[~np.isnan(table[:, 0])]
     last = table[-1] if len(table) else np.zeros(len(STRIKES.columns))
     frames, *strikes = last.astype(int).tolist()
     return {"frames": frames, "strikes": dict(zip(STRIKES.columns[1:], strikes, strict=True))}
+
+
+def threat_line(report: Mapping[str, Any]) -> str | None:
+    """What an intruder on the network did, and what came of it, in words; None without one."""
+    if "threats" not in report:
+        return None
+    threats = report["threats"]
+    strikes = ", ".join(f"{name} {count}" for name, count in threats["strikes"].items())
+    links = [train["cbtc"] for train in report["trains"].values()]
+    rejected = sum(link["rejected"] for link in links)
+    authorities = sum(link["forged_accepted"] for link in links)
+    reports = sum(link["forged_reports"] for link in links)
+    return (
+        f"threats to {threats['frames']} frames: {strikes}; {rejected} rejected, forged and"
+        f" accepted: {authorities} authorities, {reports} reports"
+    )
 
 
 def forged_authorities(tick_s: float, atp: FloatArray, given: FloatArray) -> int:
@@ -54,7 +71,7 @@ def forged_authorities(tick_s: float, atp: FloatArray, given: FloatArray) -> int
     return forged
 
 
-def report_metrics(scenario: Scenario, recording: Recording, index: int) -> dict[str, int]:
+def report_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str, int]:
     """Location reports that the zone controller took from a train, and those not given by it.
 
     A genuine one tells, to the last bit, where the train believed to be at its time-stamp, is of
@@ -63,7 +80,7 @@ def report_metrics(scenario: Scenario, recording: Recording, index: int) -> dict
     report of a tick whose belief is not on record is not judged, unless the train was silent by
     then.
     """
-    believed = recording.atp.upto(recording.ticks)[:, index]
+    believed = recording[ATP_STATE].upto(recording.ticks)[:, index]
     recorded = ~np.isnan(believed[:, ATP_STATE.index["accepted"]])
     silent = 2 + max(np.flatnonzero(recorded).tolist(), default=-1)
     train = scenario.trains[index]
@@ -76,7 +93,7 @@ def report_metrics(scenario: Scenario, recording: Recording, index: int) -> dict
     taken = forged = 0
     newest = -1
     oldest_s = max(1.0, 3.0 * scenario.tick_s) + _SAME_S
-    for tick, row in recording.reports.of(index, recording.ticks):
+    for tick, row in recording.events(REPORTS).of(index, recording.ticks):
         taken += 1
         sealed_s = row[REPORTS.index["sealed_s"]]
         then = round(sealed_s / scenario.tick_s)

@@ -10,6 +10,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from rail_corridor.equipment.train_radio.section import CBTC
+from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.plotting import COLOURS, STYLE
 
 from .theory import brakings_per_hour, line_es_n0_db
@@ -107,12 +109,11 @@ def _brakings(axes: Any, scheme: str, rows: Sequence[Row], style: dict[str, Any]
 def rate_curve(data: dict[str, Any], tick_s: float) -> tuple[Any, Any]:
     """Median Es/N0 [dB] and brakings per hour that theory gives on the line of a scenario."""
     from rail_corridor.equipment.train_radio.nodes import burst_format
-    from rail_corridor.scenario.model import Scenario
 
     from .points import STRETCH_FROM
 
-    scenario = Scenario.model_validate(data)
-    plan = scenario.cbtc
+    scenario = parse_scenario(data)
+    plan = CBTC.of(scenario)
     assert plan is not None
     line_db = line_es_n0_db(scenario, STRETCH_FROM)
     line_db = line_db - np.median(line_db)

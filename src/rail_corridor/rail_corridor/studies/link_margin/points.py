@@ -26,8 +26,8 @@ from rich.console import Console
 from scipy.stats import chi2
 
 from rail_corridor.equipment.train_radio.report import PASSED_AT
+from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.run.child_run import RunFailedError, faultless_report_of
-from rail_corridor.scenario.model import Scenario
 
 from .theory import Prediction, predict
 
@@ -275,7 +275,7 @@ def run_link_margin(out_dir: Path, quick: bool, console: Console, seeds: int = 1
     for index, point in enumerate(every):
         reports = [r for r in found[index * seeds : (index + 1) * seeds] if r is not None]
         if reports:
-            prediction = predict(Scenario.model_validate(scenario_data(point)))
+            prediction = predict(parse_scenario(scenario_data(point)))
             rows.append(aggregate(point, reports, prediction))
     rows.sort(key=lambda row: (SCHEMES.index(row.scheme), row.es_n0_db))
     write_rows(rows, out_dir / "link_margin.json")

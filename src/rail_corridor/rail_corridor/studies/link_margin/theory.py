@@ -24,7 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import j0
 
-from rail_corridor.equipment.train_radio.nodes import burst_format, cbtc_description
+from rail_corridor.equipment.train_radio.nodes import burst_format
+from rail_corridor.equipment.train_radio.section import CBTC
+from rail_corridor.equipment.train_radio.world import cbtc_description
 from rail_corridor.scenario.model import Scenario
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.train_radio.ber.closed_form import (
@@ -66,7 +68,7 @@ class Prediction:
 
 def predict(scenario: Scenario, from_share: float = 0.3) -> Prediction:
     """Theory for a scenario whose link is weak from a share of its track on."""
-    plan = scenario.cbtc
+    plan = CBTC.of(scenario)
     assert plan is not None
     levels_db = line_es_n0_db(scenario, from_share)
     losses = math.floor(plan.timeout_s / scenario.tick_s + 1e-9)
@@ -107,7 +109,7 @@ def _running(scheme: str, levels_db: FloatArray, burst: RadioBurstFormat) -> Flo
 
 def line_es_n0_db(scenario: Scenario, from_share: float, step_m: float = 10.0) -> FloatArray:
     """Mean Es/N0 per receive antenna of the best downlink along the first track [place, dB]."""
-    description, plan = cbtc_description(scenario), scenario.cbtc
+    description, plan = cbtc_description(scenario), CBTC.of(scenario)
     assert description is not None and plan is not None
     medium = CbtcMedium(description, scenario.seed, scenario.tick_s)
     track = next(iter(scenario.network.tracks.values()))

@@ -1,4 +1,4 @@
-"""What the world of a scenario is: the map that the wayside has of it, and its radio."""
+"""The radio of phase ranging as the world has it, and the map of it that the wayside has."""
 
 from __future__ import annotations
 
@@ -8,25 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from rail_corridor.equipment.doppler.nodes import reference_description
-from rail_corridor.equipment.ranging.layout import Layout, Zone
-from rail_corridor.equipment.train_bus.nodes import bus_description
-from rail_corridor.equipment.train_radio.nodes import cbtc_description, threat_periods
-from rail_corridor.scenario.fault_sections import DeadStation, DeadTransmitter, Jam, Sanding
-from rail_corridor.scenario.fault_sections import TrainStop as TrainStopFault
-from rail_corridor.scenario.fault_sections import WheelSlip as WheelSlipFault
 from rail_corridor.scenario.model import Scenario
+from rail_world.line.drawing import Drawing, Mast, Stretch
 from rail_world.ranging.description import (
     AntennaPattern,
     Fault,
     RadioDescription,
     StationAntenna,
-    ZoneExtent,
 )
-from rail_world.track_code.description import Harmonic, RailDescription, RailFault, TrackCircuit
-from rail_world.world_file import TrainStop, WheelSlip, WorldFile
 
-from .announcement import announcement
+from .layout import Layout, Zone, layout_of
+from .section import CHANNELS, RADIO, SIGNAL, DeadStation, Jam
 
 #: Antennas of a branching station look this far outward, so that their levels part at once.
 SQUINT_RAD = math.radians(25.0)
@@ -57,9 +49,9 @@ def survey(
     return chainage[first:last], distance[first:last]
 
 
-def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
-    """Tracks, trains, antennas and faults of a run, as the world and its media read them."""
-    plan = scenario.radio
+def radio_of(scenario: Scenario) -> RadioDescription:
+    """Antennas, patterns, noise and faults of the radio."""
+    layout, plan = layout_of(scenario), RADIO.of(scenario)
     antennas = []
     for station in layout.stations:
         zones = [layout.zone(name) for name in station.zones]
@@ -80,10 +72,10 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
         "beamwidth_deg": plan.wrs_beamwidth_deg,
         "front_to_back_db": plan.front_to_back_db,
     }
-    radio = RadioDescription(
-        sample_rate_hz=scenario.ranging.sample_rate_hz,
-        samples=scenario.ranging.samples,
-        carriers_hz=scenario.channels.carriers_hz,
+    return RadioDescription(
+        sample_rate_hz=SIGNAL.of(scenario).sample_rate_hz,
+        samples=SIGNAL.of(scenario).samples,
+        carriers_hz=CHANNELS.of(scenario).carriers_hz,
         stations=tuple(antennas),
         trains=tuple(train.name for train in scenario.trains),
         station_pattern=AntennaPattern(gain_dbi=plan.wrs_gain_dbi, **pattern),
@@ -101,75 +93,23 @@ def world_file(scenario: Scenario, layout: Layout) -> WorldFile:
             if isinstance(fault, DeadStation | Jam)
         ),
     )
-    return WorldFile(
-        seed=scenario.seed,
-        tick_s=scenario.tick_s,
-        tracks=scenario.tracks,
-        junctions=scenario.junctions,
-        trains=scenario.trains,
-        radio=radio,
-        rails=rails_of(scenario),
-        cbtc=cbtc_description(scenario),
-        threats=threat_periods(scenario),
-        references=reference_description(scenario),
-        bus=bus_description(scenario),
-        stops=tuple(
-            TrainStop(train=fault.train, from_s=fault.from_s, to_s=fault.to_s)
-            for fault in scenario.faults
-            if isinstance(fault, TrainStopFault)
-        ),
-        slips=tuple(
-            WheelSlip(train=fault.train, from_s=fault.from_s, to_s=fault.to_s, ratio=fault.ratio)
-            for fault in scenario.faults
-            if isinstance(fault, WheelSlipFault)
-        ),
-        odometer_error=scenario.odometer_error,
-        zones=tuple(
-            ZoneExtent(
-                zone=zone.name,
+
+
+def drawing_of(scenario: Scenario) -> Drawing:
+    """Masts, and zones coloured by their channel pairs."""
+    layout = layout_of(scenario)
+    return Drawing(
+        masts=tuple(Mast(name=s.name, position_m=s.position_m) for s in layout.stations),
+        stretches=tuple(
+            Stretch(
+                name=zone.name,
                 track=zone.track,
                 start_m=zone.start_m,
                 end_m=zone.end_m,
-                downlink_channel=zone.downlink_channel,
+                group=zone.downlink_channel,
             )
             for zone in layout.zones
         ),
-        scenario=announcement(scenario),
-    )
-
-
-def rails_of(scenario: Scenario) -> RailDescription | None:
-    """The rails and their circuits, None where there are none."""
-    plan = scenario.track_circuits
-    if plan is None:
-        return None
-    # A wave of amplitude 1 over the noise in 300 Hz.
-    noise_v = math.sqrt(0.5 * plan.sample_rate_hz / 600.0) * 10.0 ** (-plan.snr_db / 20.0)
-    faults = [f for f in scenario.faults if isinstance(f, Sanding | DeadTransmitter)]
-    return RailDescription(
-        circuits=tuple(
-            TrackCircuit(
-                name=c.name,
-                track=c.track,
-                start_m=c.start_m,
-                end_m=c.end_m,
-                carrier_hz=c.carrier_hz,
-            )
-            for c in scenario.circuits
-        ),
-        trains=tuple(train.name for train in scenario.trains),
-        tracks=tuple(scenario.tracks),
-        sample_rate_hz=plan.sample_rate_hz,
-        attenuation_db_per_km=plan.attenuation_db_per_km,
-        joint_attenuation_db=plan.joint_db,
-        white_noise_v=noise_v,
-        impulse_rate_per_s=plan.impulses_per_s,
-        impulse_amplitude_v=1.0 if plan.impulses_per_s else 0.0,
-        harmonics=tuple(
-            Harmonic(order=order, amplitude_v=10.0 ** (level_db / 20.0))
-            for order, level_db in plan.harmonics
-        ),
-        faults=tuple(RailFault(**fault.model_dump()) for fault in faults),
     )
 
 
@@ -179,7 +119,7 @@ def reach_m(scenario: Scenario, layout: Layout, zone: Zone) -> float:
     Two zones (Jeong et al., section 2.5): the straight line to the end of the next zone, the
     nearest where the line branches, so that the third zone may use the same channels again.
     """
-    plan = scenario.radio
+    plan = RADIO.of(scenario)
     mast = np.array(layout.station(zone.station).position_m)
     ends = [layout.zone(name) for name in zone.next] or [zone]
     distances = []

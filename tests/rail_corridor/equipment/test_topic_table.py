@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import itertools
+import pkgutil
 import re
 
 import pytest
@@ -15,7 +17,8 @@ from rclpy.qos import (
     qos_check_compatible,
 )
 
-from rail_msgs_py.topics.builtin import ALL, MODULES, kind_of
+import rail_msgs_py.topics
+from rail_corridor.equipment.registry import kind_of, topics
 from rail_msgs_py.topics.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
 from rail_msgs_py.topics.ranging import RANGE
 from rail_msgs_py.topics.tick import FAILED, FINISHED, OBSERVED, READY
@@ -35,6 +38,11 @@ PARTS = {
     "end": ("head", "tail"),
     "node": ("/world/radio_medium", "/wayside/zone_controller"),
 }
+MODULES = [
+    importlib.import_module(f"rail_msgs_py.topics.{found.name}")
+    for found in pkgutil.iter_modules(rail_msgs_py.topics.__path__)
+]
+#: Every topic that a module defines.
 FIELDS = {
     name: value
     for module in MODULES
@@ -56,20 +64,22 @@ def names_of(topic: Topic) -> list[str]:
 
 
 def test_the_table_is_complete_and_names_nothing_twice() -> None:
-    assert sorted(ALL, key=lambda t: t.pattern) == sorted(FIELDS.values(), key=lambda t: t.pattern)
-    assert len({topic.pattern for topic in ALL}) == len(ALL)
+    assert sorted(topics(), key=lambda t: t.pattern) == sorted(
+        FIELDS.values(), key=lambda t: t.pattern
+    )
+    assert len({topic.pattern for topic in topics()}) == len(topics())
 
 
-@pytest.mark.parametrize("topic", ALL, ids=lambda t: t.pattern)
+@pytest.mark.parametrize("topic", topics(), ids=lambda t: t.pattern)
 def test_every_name_tells_its_kind_and_no_other(topic: Topic) -> None:
     for name in names_of(topic):
         assert re.fullmatch(r"(/[A-Za-z_]\w*)+", name), "a ROS name"
         assert kind_of(name) is topic
-        others = [other.pattern for other in ALL if other is not topic and other.matches(name)]
+        others = [other.pattern for other in topics() if other is not topic and other.matches(name)]
         assert others == []
 
 
-@pytest.mark.parametrize("topic", ALL, ids=lambda t: t.pattern)
+@pytest.mark.parametrize("topic", topics(), ids=lambda t: t.pattern)
 def test_every_topic_is_documented(topic: Topic) -> None:
     for text in (topic.sender, topic.readers, topic.text):
         assert text.strip()
@@ -89,7 +99,7 @@ def test_a_missing_part_of_a_name_is_an_error() -> None:
         RANGE.name(site="wrs1")
 
 
-@pytest.mark.parametrize("topic", [t for t in ALL if t.view], ids=lambda t: t.pattern)
+@pytest.mark.parametrize("topic", [t for t in topics() if t.view], ids=lambda t: t.pattern)
 def test_a_view_reads_the_type_of_its_topic(topic: Topic) -> None:
     assert callable(topic.view.from_msg)
     if topic.type().get_fields_and_field_types().keys() == {"layout", "data"}:
@@ -111,7 +121,7 @@ def test_every_profile_is_reliable_and_serves_a_default_reader(profile: QoSProfi
 
 def test_what_the_report_reads_outlasts_the_window_it_may_lag() -> None:
     assert ESTIMATE.depth >= 2 * OBSERVER_WINDOW_TICKS
-    read_late = [t for t in ALL if "the report" in t.readers and t.qos is not LATCHED]
+    read_late = [t for t in topics() if "the report" in t.readers and t.qos is not LATCHED]
     assert len(read_late) > 10
     assert all(topic.qos is ESTIMATE for topic in read_late)
 

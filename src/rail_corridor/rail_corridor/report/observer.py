@@ -8,17 +8,19 @@ from typing import Any
 
 from std_msgs.msg import Header
 
-from rail_corridor.report.intake import Intake
-from rail_corridor.report.map_markers import train_markers
-from rail_corridor.report.run_data import Recording
+from rail_corridor.plan.plan import REPORT, Plan
+from rail_corridor.run_data import RunData
 from rail_msgs_py.failures import failure
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
+from rail_msgs_py.topics.ranging import POSITION
 from rail_msgs_py.topics.tick import FAILED, OBSERVED
 from rail_msgs_py.topics.world import STATE, TRAIN_MARKERS
 
-from .plan import REPORT, Plan
+from .intake import Intake
+from .map_markers import train_markers
 
 NAME = REPORT.strip("/")
 
@@ -29,8 +31,6 @@ class Observer(CorridorNode):
     Parameters
     ----------
     plan : Plan
-    tracks : tuple of str
-        Names of the tracks in the order of the scenario.
     on_progress : callable
         Called about ten times a second of wall time.
     record : bool
@@ -40,7 +40,6 @@ class Observer(CorridorNode):
     def __init__(
         self,
         plan: Plan,
-        tracks: tuple[str, ...],
         on_progress: Callable[[], None],
         *,
         context: Any = None,
@@ -48,7 +47,7 @@ class Observer(CorridorNode):
     ) -> None:
         super().__init__(NAME, "/", context=context, services=False)
         self._tick_ns = plan.world.tick_ns
-        self.intake = Intake(plan, tracks)
+        self.intake = Intake(plan)
         self._failed = self.publisher(FAILED)
         if record:
             self._network = plan.world.network()
@@ -67,7 +66,7 @@ class Observer(CorridorNode):
             self.announce_when_connected()
 
     @property
-    def recording(self) -> Recording:
+    def recording(self) -> RunData:
         """What has been read."""
         return self.intake.recording
 
@@ -90,7 +89,7 @@ class Observer(CorridorNode):
     def complete(self) -> bool:
         """Whether the last tick of a finished run has been read in full."""
         ticks = self.finished_ticks
-        return ticks is not None and self.intake.complete(ticks)
+        return ticks is not None and self.recording.complete(ticks)
 
     def announce_failure(self, node: str, reason: str) -> None:
         """Tell the corridor that a node has gone."""
@@ -125,9 +124,9 @@ class Observer(CorridorNode):
         if tick < 0:
             return
         recording = self.intake.recording
-        records = [recording.state, recording.position]
-        if recording.localizer:
-            records.append(recording.located)
+        records = [recording[STATE], recording[POSITION]]
+        if LOCALIZER_STATE in recording:
+            records.append(recording[LOCALIZER_STATE])
         rows = [record.upto(tick + 1)[tick] for record in records]
         stamp_ns = tick * self._tick_ns
         markers = train_markers(

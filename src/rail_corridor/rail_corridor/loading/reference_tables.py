@@ -10,12 +10,12 @@ from pydantic_core import PydanticUndefined
 
 from rail_world.line.description import Davis, VehicleDescription
 
-from .model import Scenario, models_of
+from .schema import models_of, scenario_model
 
 
 def field_tables() -> str:
     """Return one Markdown table per section of a scenario file, with every field."""
-    return "\n\n".join(_table(model) for model in models_of(Scenario))
+    return "\n\n".join(_table(model) for model in models_of(scenario_model()))
 
 
 def _table(model: type[BaseModel]) -> str:

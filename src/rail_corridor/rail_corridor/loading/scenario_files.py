@@ -15,8 +15,9 @@ import yaml
 
 from rail_corridor.errors import InputError
 from rail_corridor.recording.frames import Attachment
+from rail_corridor.scenario.model import Scenario
 
-from .model import Scenario, scenario_from_data
+from .loader import scenario_from_data
 from .yaml_file import parse_yaml, read_text_file
 
 SCENARIO: Final = "scenario.yaml"

@@ -13,9 +13,10 @@ from rail_signals.doppler.bound import shift_variance_hz2 as variance_of_shifts_
 from rail_signals.doppler.surveyed_line import SurveyedLine
 from rail_world.doppler.medium import ReferenceMedium
 
-from .nodes import WALK_HZ, reference_description
-from .placement import Reference
-from .section import ReferencePlan
+from .nodes import WALK_HZ
+from .placement import Reference, references_of
+from .section import REFERENCES, ReferencePlan
+from .world import reference_description
 
 FloatArray = NDArray[np.float64]
 
@@ -38,13 +39,13 @@ class ReferencedTrack:
     @classmethod
     def of(cls, scenario: Scenario, track: str) -> ReferencedTrack:
         """The track of a scenario; ValueError if that has no reference stations."""
-        described, plan = reference_description(scenario), scenario.references
+        described, plan = reference_description(scenario), REFERENCES.of(scenario)
         if described is None or plan is None:
             raise ValueError(f"{scenario.name} has no reference stations")
         way = scenario.network.tracks[track]
         s = np.linspace(0.0, way.length_m, int(np.ceil(way.length_m / _STEP_M)) + 1)
         pose = way.pose(s)
-        stations = tuple(found for found in scenario.reference_stations if found.track == track)
+        stations = tuple(found for found in references_of(scenario) if found.track == track)
         return cls(
             plan,
             SurveyedLine(s, pose.x_m, pose.y_m, pose.z_m, pose.heading_rad),

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from rail_corridor.equipment.registry import subsystems
+from rail_corridor.equipment.subsystem import SectionOption
 from rail_corridor.errors import InputError
 from rail_world.line.description import TrainDescription
 from rail_world.line.network import Network
@@ -28,10 +30,9 @@ class Overrides:
         TTOBench file that takes the place of the first track.
     trains : int, optional
         Number of trains: that many of a timetable, or the first ones of a list.
-    zone_length_m : float, optional
-        Automatic placing of stations with this zone length [m].
-    reference_spacing_m, reference_offset_m : float, optional
-        Reference stations so far apart and off the track [m].
+    sections : mapping
+        Fields of sections of equipment by their option, as ``{"--zone-length": 200.0}``; None
+        leaves one as it is. See `rail_corridor.equipment.subsystem.SectionOption`.
     reverse : bool
         Trains run the other way, from the other end of their track.
     """
@@ -40,9 +41,7 @@ class Overrides:
     duration_s: float | None = None
     track: str | Path | None = None
     trains: int | None = None
-    zone_length_m: float | None = None
-    reference_spacing_m: float | None = None
-    reference_offset_m: float | None = None
+    sections: Mapping[str, float | None] = field(default_factory=dict)
     reverse: bool = False
 
 
@@ -51,9 +50,6 @@ _OPTIONS: Final[Mapping[str, str]] = {
     "duration_s": "--duration",
     "track": "--track",
     "trains": "--trains",
-    "zone_length_m": "--zone-length",
-    "reference_spacing_m": "--spacing",
-    "reference_offset_m": "--offset",
 }
 
 
@@ -74,24 +70,22 @@ def apply_overrides(data: dict[str, Any], overrides: Overrides) -> dict[str, str
             name: {"ttobench": str(Path(overrides.track).absolute())},
         }
         origins[f"tracks.{name}"] = "track"
-    if overrides.zone_length_m is not None:
-        stations = data.get("stations")
-        kept = stations if isinstance(stations, dict) else {}
-        data["stations"] = {
-            **{key: value for key, value in kept.items() if key != "positions"},
-            "zone_length_m": overrides.zone_length_m,
-        }
-        origins["stations.zone_length_m"] = "zone_length_m"
-    for name, field in (("reference_spacing_m", "spacing_m"), ("reference_offset_m", "offset_m")):
-        value = getattr(overrides, name)
+    known = {each.option: each for subsystem in subsystems() for each in subsystem.options}
+    for option, value in overrides.sections.items():
         if value is not None:
-            plan = data.get("references")
-            data["references"] = {**(plan if isinstance(plan, dict) else {}), field: value}
-            origins[f"references.{field}"] = name
+            _set_field(data, known[option], value)
+            origins[known[option].path] = option
     if overrides.trains is not None:
         _apply_train_count(data, overrides.trains)
         origins["timetable.count"] = "trains"
     return origins
+
+
+def _set_field(data: dict[str, Any], option: SectionOption, value: float) -> None:
+    section = data.get(option.section)
+    kept = section if isinstance(section, dict) else {}
+    kept = {key: kept[key] for key in kept if key not in option.replaces}
+    data[option.section] = {**kept, option.field: value}
 
 
 def _apply_train_count(data: dict[str, Any], count: int) -> None:
@@ -145,10 +139,10 @@ def blame_override(
     """Return the error as one of the command line, if the field it names came from there."""
     for prefix, name in origins.items():
         if not error.file and (error.field == prefix or error.field.startswith(f"{prefix}.")):
-            return InputError(
-                error.reason,
-                file=COMMAND_LINE,
-                field=_OPTIONS[name],
-                value=getattr(overrides, name),
-            )
+            if name in overrides.sections:
+                value: Any = overrides.sections[name]
+            else:
+                value = getattr(overrides, name)
+            field = _OPTIONS.get(name, name)
+            return InputError(error.reason, file=COMMAND_LINE, field=field, value=value)
     return error

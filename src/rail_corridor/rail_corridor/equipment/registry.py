@@ -1,0 +1,104 @@
+"""Every kind of equipment that a corridor may have.
+
+Other distributions add theirs by an entry point of the group ``rail_corridor.equipment`` that names
+an instance of `Subsystem`; see docs/adding_equipment.md.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from importlib.metadata import entry_points
+from typing import Final
+
+from rail_corridor.errors import InputError
+from rail_corridor.scenario.model import Scenario
+from rail_msgs_py.topics import tick, world
+from rail_msgs_py.topics.topic import Topic
+
+from .doppler.subsystem import DOPPLER
+from .localizer.subsystem import LOCALIZER
+from .node_spec import NodeKind
+from .ranging.subsystem import RANGING
+from .subsystem import Subsystem, Supervision
+from .track_code.subsystem import TRACK_CODE
+from .train_bus.subsystem import TRAIN_BUS
+from .train_radio.subsystem import TRAIN_RADIO
+
+GROUP: Final = "rail_corridor.equipment"
+#: In the order in which they are asked.
+BUILTIN: Final = (RANGING, TRACK_CODE, TRAIN_RADIO, DOPPLER, LOCALIZER, TRAIN_BUS)
+WORLD: Final = NodeKind("world", "rail_world.world_node:WorldNode", waits=True)
+
+
+@lru_cache(maxsize=1)
+def subsystems() -> tuple[Subsystem, ...]:
+    """All subsystems: those of the corridor, then those of other distributions by name.
+
+    Raises
+    ------
+    InputError
+        If one of another distribution cannot be loaded, or takes a name that is taken.
+    """
+    found: list[Subsystem] = list(BUILTIN)
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+        try:
+            extra = entry.load()
+        except Exception as error:
+            reason = f"cannot be loaded: {type(error).__name__}: {error}"
+            raise InputError(reason, field=GROUP, value=entry.value) from None
+        if not isinstance(extra, Subsystem):
+            raise InputError("is not a Subsystem", field=GROUP, value=entry.value)
+        _refuse_twins(found, extra, entry.value)
+        found.append(extra)
+    return tuple(found)
+
+
+def _refuse_twins(found: list[Subsystem], extra: Subsystem, where: str) -> None:
+    for other in found:
+        for what, mine, theirs in (
+            ("name", {extra.name}, {other.name}),
+            ("section", {s.name for s in extra.sections}, {s.name for s in other.sections}),
+            ("kind of node", {n.name for n in extra.nodes}, {n.name for n in other.nodes}),
+            ("topic", {t.pattern for t in extra.topics}, {t.pattern for t in other.topics}),
+        ):
+            for twin in sorted(mine & theirs):
+                raise InputError(f"{what} {twin} belongs to {other.name}", field=GROUP, value=where)
+
+
+@lru_cache(maxsize=1)
+def node_kinds() -> dict[str, NodeKind]:
+    """Every kind of node by its name."""
+    kinds = [WORLD, *(kind for subsystem in subsystems() for kind in subsystem.nodes)]
+    return {kind.name: kind for kind in kinds}
+
+
+@lru_cache(maxsize=1)
+def topics() -> tuple[Topic, ...]:
+    """Every kind of topic, in the order of the documentation."""
+    common = (*tick.TOPICS, *world.TOPICS)
+    return (*common, *(topic for subsystem in subsystems() for topic in subsystem.topics))
+
+
+def kind_of(name: str) -> Topic | None:
+    """The kind of a topic by its absolute name, None if it is not one of the corridor's."""
+    if name.endswith("/done"):
+        return tick.DONE
+    return next((topic for topic in topics() if topic.matches(name)), None)
+
+
+def supervision_of(scenario: Scenario) -> Supervision | None:
+    """What the trains of a scenario obey, None if they run by themselves."""
+    found = (subsystem.supervision(scenario) for subsystem in subsystems())
+    return next((each for each in found if each is not None), None)
+
+
+def odometer_error_of(scenario: Scenario) -> float | None:
+    """Standard deviation of the wheels' error, None where nobody reads them.
+
+    Of several that read them, what trains obey comes first.
+    """
+    supervision = supervision_of(scenario)
+    if supervision is not None:
+        return supervision.odometer_error
+    found = (subsystem.odometer_error(scenario) for subsystem in subsystems())
+    return next((each for each in found if each is not None), None)

@@ -1,0 +1,1 @@
+"""Loading a scenario: files, overrides, checks."""

@@ -1,0 +1,74 @@
+"""The model of a scenario file: the common fields, and a section of all equipment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache, reduce
+from operator import or_
+from typing import Annotated, Any, get_args
+
+from pydantic import BaseModel, Field, create_model
+
+from rail_corridor.equipment.registry import subsystems
+from rail_corridor.scenario.faults import TrainStop, WheelSlip
+from rail_corridor.scenario.model import Scenario
+
+
+@lru_cache(maxsize=1)
+def scenario_model() -> type[Scenario]:
+    """Model of a scenario with the sections and faults of all equipment."""
+    sections: dict[str, Any] = {
+        section.name: (
+            section.kind,
+            Field(default=section.default, description=section.description),
+        )
+        for subsystem in subsystems()
+        for section in subsystem.sections
+    }
+    faults = (TrainStop, WheelSlip, *(f for each in subsystems() for f in each.faults))
+    fault: Any = Annotated[reduce(or_, faults), Field(discriminator="kind")]
+    common = Scenario.model_fields["faults"]
+    sections["faults"] = (
+        tuple[fault, ...],
+        Field(default=(), max_length=1000, description=common.description),
+    )
+    made: type[Scenario] = create_model(
+        "Scenario", __base__=Scenario, __module__=Scenario.__module__, **sections
+    )
+    made.__doc__ = Scenario.__doc__
+    return made
+
+
+def parse_scenario(data: object) -> Scenario:
+    """A scenario of plain data; no more is checked than each section by itself.
+
+    Raises
+    ------
+    pydantic.ValidationError
+    """
+    return scenario_model().model_validate(data)
+
+
+def field_names() -> set[str]:
+    """Name of every field that a scenario may hold, for suggestions."""
+    return {name for model in models_of(scenario_model()) for name in model.model_fields}
+
+
+def models_of(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
+    """Yield a model and the models of its fields, each once, in the order of the file."""
+    waiting, seen = [model], {model}
+    while waiting:
+        model = waiting.pop(0)
+        yield model
+        for field in model.model_fields.values():
+            for found in _models_in(field.annotation):
+                if found not in seen:
+                    seen.add(found)
+                    waiting.append(found)
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _models_in(argument)

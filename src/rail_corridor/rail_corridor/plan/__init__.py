@@ -1,0 +1,1 @@
+"""From a scenario to what runs: nodes, their parameters, the world file."""

@@ -1,0 +1,161 @@
+"""From a scenario to nodes: what runs, with which parameters, in which process."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from rail_corridor.equipment.node_spec import NodeSpec, Side
+from rail_corridor.equipment.registry import (
+    node_kinds,
+    odometer_error_of,
+    subsystems,
+    supervision_of,
+)
+from rail_corridor.equipment.subsystem import PlanContext
+from rail_corridor.errors import InputError
+from rail_corridor.run_data import RecordSpec, RunData, in_one_message
+from rail_corridor.scenario.model import Scenario
+from rail_msgs_py.topics.world import STATE
+from rail_world.world_file import WorldFile
+
+from .world_plan import world_file
+
+Placement = Literal["one", "site", "node"]
+
+WORLD: Final = "/world"
+#: Full name of the node that reads the run for its report.
+REPORT: Final = "/report"
+#: Participants of one host that discovery on the local host can bring together, with margin.
+MOST_PROCESSES = 26
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything that a run needs, made from a scenario before anything starts."""
+
+    scenario: str
+    seed: int
+    ticks: int
+    tick_s: float
+    nodes: tuple[NodeSpec, ...]
+    world: WorldFile
+    records: tuple[RecordSpec, ...]
+
+    def groups(
+        self, placement: Placement, only: Side | None = None, external: Iterable[str] = ()
+    ) -> dict[str, list[NodeSpec]]:
+        """Nodes by process.
+
+        Parameters
+        ----------
+        placement : 'one', 'site' or 'node'
+        only : 'wayside' or 'onboard', optional
+            Part of the corridor that this host runs; the world is with the wayside.
+        external : iterable of str
+            Full names of nodes that somebody else runs; the corridor waits for them.
+        """
+        others = set(external)
+        sides = {None: None, "wayside": ("world", "wayside"), "onboard": ("onboard",)}[only]
+        nodes = [spec for spec in self.nodes if sides is None or spec.side in sides]
+        nodes = [spec for spec in nodes if spec.name not in others]
+        if placement == "one":
+            return {"corridor": nodes}
+        groups: dict[str, list[NodeSpec]] = {}
+        for spec in nodes:
+            key = spec.site if placement == "site" else spec.name.strip("/").replace("/", "_")
+            groups.setdefault(key, []).append(spec)
+        return _packed(groups)
+
+
+def check_external(plan: Plan, external: Iterable[str]) -> None:
+    """Raise InputError for a node that cannot be somebody else's."""
+    known = [spec.name for spec in plan.nodes if spec.name != WORLD]
+    for name in external:
+        if name in known:
+            continue
+        close = difflib.get_close_matches(name, known, n=1)
+        reason = "the corridor has no such node that could be replaced"
+        reason += f", did you mean {close[0]}" if close else ""
+        raise InputError(reason, field="--external", value=name)
+
+
+def _packed(groups: dict[str, list[NodeSpec]]) -> dict[str, list[NodeSpec]]:
+    """Neighbouring processes put together until there are few enough to find each other."""
+    if len(groups) <= MOST_PROCESSES:
+        return groups
+    fixed = {name: specs for name, specs in groups.items() if specs[0].side == "world"}
+    rest = [(name, specs) for name, specs in groups.items() if name not in fixed]
+    parts = np.array_split(np.arange(len(rest)), MOST_PROCESSES - len(fixed))
+    for part in parts:
+        members = [rest[index] for index in part]
+        name = members[0][0] if len(members) == 1 else f"{members[0][0]}-{members[-1][0]}"
+        fixed[name] = [spec for _, specs in members for spec in specs]
+    return fixed
+
+
+def make_plan(
+    scenario: Scenario,
+    run_directory: Path,
+    *,
+    rate: float = 0.0,
+    observed: bool = True,
+    timeout_s: float = 30.0,
+    external: Iterable[str] = (),
+    bystanders: Iterable[str] = (),
+) -> Plan:
+    """Plan a run; writes the world file into ``run_directory``.
+
+    The world waits for the nodes of the plan, and for ``bystanders``, which are not in it.
+    """
+    world = world_file(scenario)
+    world_path = run_directory / "world.json"
+    world_path.write_text(world.model_dump_json())
+    context = PlanContext(str(world_path), timeout_s, subsystems())
+    nodes = [spec for each in subsystems() for spec in each.plan(scenario, context)]
+    kinds = node_kinds()
+    clocked = {spec.name for spec in nodes if kinds[spec.kind].clocked}
+    supervision = supervision_of(scenario)
+    trains = tuple(train.name for train in scenario.trains)
+    parameters = {
+        "world_file": str(world_path),
+        "ticks": scenario.ticks,
+        "rate": float(rate),
+        "nodes": (*(spec.name for spec in nodes), *bystanders),
+        "sinks": tuple(spec.name for spec in nodes if kinds[spec.kind].sink),
+        "clock_readers": len(clocked - {*external}),
+        "supervised": trains if supervision else (),
+        "odometers": () if odometer_error_of(scenario) is None else trains,
+        "supervision": supervision.node if supervision else "",
+        "cab_signals": supervision is None or supervision.cab_signals,
+        "observed": observed,
+        "end_when_arrived": scenario.end_when_arrived,
+        "timeout_s": timeout_s,
+    }
+    return Plan(
+        scenario.name,
+        scenario.seed,
+        scenario.ticks,
+        scenario.tick_s,
+        (NodeSpec("world", WORLD, "world", parameters), *nodes),
+        world,
+        records_of(scenario),
+    )
+
+
+def records_of(scenario: Scenario) -> tuple[RecordSpec, ...]:
+    """What the report reads: the truth, and what all equipment has to say."""
+    names = [train.name for train in scenario.trains]
+    truth = RecordSpec(STATE, in_one_message(names), estimated=False)
+    return (truth, *(spec for each in subsystems() for spec in each.records(scenario)))
+
+
+def run_data_of(scenario: Scenario) -> RunData:
+    """Where the report of a run is gathered, still empty."""
+    names = tuple(train.name for train in scenario.trains)
+    return RunData(names, tuple(scenario.tracks), STATE, records_of(scenario))

@@ -1,0 +1,45 @@
+"""Faults of trains, and what the faults of all equipment have in common."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from rail_world.line.description import Description, Name, Number
+
+from .section_fields import Time
+
+
+class Fault(Description):
+    """Something that goes wrong; each kind has a ``kind`` of its own."""
+
+    kind: str
+
+
+class TimedFault(Fault):
+    """A fault that lasts from one time to another."""
+
+    from_s: Time = Field(default=0.0, description="start [s]")
+    to_s: Time = Field(default=1e6, description="end [s]")
+
+    @model_validator(mode="after")
+    def _has_a_duration(self) -> TimedFault:
+        if self.to_s <= self.from_s:
+            raise ValueError(f"to_s: must be after from_s, {self.from_s:g} s")
+        return self
+
+
+class TrainStop(TimedFault):
+    """A train that brakes to a stand as fast as it can and stays there."""
+
+    kind: Literal["train_stop"]
+    train: Name = Field(description="the train")
+
+
+class WheelSlip(TimedFault):
+    """Wheels that turn faster or slower than the train runs."""
+
+    kind: Literal["wheel_slip"]
+    train: Name = Field(description="the train")
+    ratio: Number = Field(ge=0.0, le=3.0, description="speed of the wheels over that of the train")

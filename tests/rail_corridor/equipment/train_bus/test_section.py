@@ -224,7 +224,7 @@ def test_the_bus_is_part_of_the_digest_its_truth_is_not() -> None:
     other[BUS_LINKS].put(3, 0, np.zeros(3))
     assert other.digest() == digest
     for record in (other[BUS_LINK, "head"], other[BUS_LINK, "tail"], other[BUS_STATE]):
-        record.put(3, 0, np.zeros(record.columns))
+        record.put(3, 0, np.zeros(record.upto(1).shape[2]))
         assert other.digest() != digest
         digest = other.digest()
 

@@ -230,6 +230,7 @@ def run_checks(pytest_arguments: list[str]) -> int:
     checks = {
         "ruff format": [str(VENV / "bin" / "ruff"), "format", "--check", "."],
         "ruff check": [str(VENV / "bin" / "ruff"), "check", "."],
+        "imports": [str(VENV / "bin" / "lint-imports"), "--no-cache"],
         "mypy": [python, "-m", "mypy"],
         "documents": [python, str(ROOT / "docs" / "refresh.py"), "--check"],
     }

@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rail_corridor.equipment.doppler.placement import references_of
+from rail_signals.arrays import FloatArray
 
 # Before NumPy is loaded; harmless, and without effect, where it is loaded already.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -34,7 +35,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from rail_corridor.equipment.doppler.nodes import positioning_nodes
-from rail_corridor.equipment.doppler.reference_coverage import FloatArray, ReferencedTrack
+from rail_corridor.equipment.doppler.reference_coverage import ReferencedTrack
 from rail_corridor.equipment.doppler.world import reference_description
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.loading.overrides import Overrides

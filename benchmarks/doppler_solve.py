@@ -24,6 +24,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from rail_signals.arrays import FloatArray
+
 # Before NumPy is loaded; harmless, and without effect, where it is loaded already.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -37,8 +39,6 @@ from rail_signals.doppler.solver import DopplerSolver, Prior, Reason
 from rail_signals.doppler.surveyed_line import SurveyedLine
 from rail_signals.doppler.tone_plan import TonePlan
 from rail_world.line.alignment import Alignment, Element
-
-FloatArray = NDArray[np.float64]
 
 PLAN = TonePlan()
 SPACING_M, ASIDE_M, REACH_M = 600.0, 20.0, 1500.0

@@ -19,9 +19,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.loading.overrides import Overrides
+from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.plan.plan import Plan, make_plan
 from rail_corridor.run.host import make_node
-from rail_corridor.run.middleware import discover_on
 from rail_corridor.scenario.model import Scenario
 
 

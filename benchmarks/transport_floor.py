@@ -15,7 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from rail_corridor.run.middleware import discover_on
+from rail_corridor.middleware.discovery import discover_on
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.ranging.range_reading import RangeWriter
 from rail_msgs_py.stamps import clock_to_cdr

@@ -14,8 +14,8 @@ import numpy as np
 
 from rail_corridor.equipment.ranging.nodes import CONTROLLER
 from rail_corridor.loading.loader import load_scenario
+from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.plan.plan import make_plan
-from rail_corridor.run.middleware import discover_on
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.node import CorridorNode

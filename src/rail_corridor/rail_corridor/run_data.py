@@ -7,13 +7,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 
 from rail_msgs_py.table import Table, figures_from_cdr
 from rail_msgs_py.topics.topic import Topic
+from rail_signals.arrays import BoolArray, FloatArray
 
-FloatArray = NDArray[np.float64]
 #: Stamp [ns] and values [row, column] of a serialised message.
 Decoder = Callable[[bytes], tuple[int, FloatArray]]
 
@@ -42,9 +41,9 @@ class Record:
             self._values = np.concatenate((self._values, np.full_like(self._values, np.nan)))
         return self._values[:ticks]
 
-    def received(self, ticks: int) -> NDArray[np.bool_]:
+    def received(self, ticks: int) -> BoolArray:
         """Whether every row of each of the first ticks is here."""
-        return ~np.isnan(self.upto(ticks)[:, :, 0]).any(axis=1)
+        return np.asarray(~np.isnan(self.upto(ticks)[:, :, 0]).any(axis=1))
 
     def received_at(self, tick: int) -> bool:
         """Whether every row of a tick is here."""
@@ -69,7 +68,7 @@ class EventRecord:
             for line in lines if tick < ticks else ():
                 yield tick, line
 
-    def received(self, ticks: int) -> NDArray[np.bool_]:
+    def received(self, ticks: int) -> BoolArray:
         """Whether every row of each of the first ticks is here."""
         return np.array([self.received_at(tick) for tick in range(ticks)], dtype=bool)
 

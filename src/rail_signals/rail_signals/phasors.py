@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rail_signals.ranging.signal import ComplexArray
+from rail_signals.arrays import ComplexArray
 
 
 def rotation(

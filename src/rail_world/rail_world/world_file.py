@@ -10,30 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from rail_world.line.description import JunctionDescription, TrackDescription
 from rail_world.line.drawing import Drawing
 from rail_world.line.network import Network, build_network
-from rail_world.trains.description import TrainDescription
+from rail_world.trains.description import TrainDescription, TrainStop, WheelSlip
 
 Part = TypeVar("Part", bound=BaseModel)
-
-
-class TrainStop(BaseModel):
-    """A train that brakes to a stand by itself, from one time [s] to another."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    train: str
-    from_s: float
-    to_s: float
-
-
-class WheelSlip(BaseModel):
-    """Wheels that turn `ratio` times as fast as the train runs, from one time [s] to another."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    train: str
-    from_s: float
-    to_s: float
-    ratio: float = Field(ge=0.0, le=10.0)
 
 
 class WorldFile(BaseModel):

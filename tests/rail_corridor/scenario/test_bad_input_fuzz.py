@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.errors import InputError
 from rail_corridor.loading.loader import builtin_scenarios, scenario_from_data
-from rail_corridor.loading.yaml_file import load_yaml, parse_yaml
 from rail_corridor.scenario.model import Scenario
+from rail_corridor.yaml_file import load_yaml, parse_yaml
 
 BASES = [load_yaml(builtin_scenarios()[name]) for name in ("branch", "demo", "plain_line")]
 NAMES = sorted({"main", "wrs1", *(key for base in BASES for key in base)})

@@ -7,11 +7,10 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from rail_signals.arrays import FloatArray
 from rail_wayside.ranging.zone_map import NEIGHBOURHOOD, Zone, ZoneMap
 
-FloatArray = NDArray[np.float64]
 OFFSET_M, HEIGHT_M = 3.0, 5.0
 
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import ComplexArray
 from rail_signals.ranging.receiver import LineReceiver, ToneEstimate
 from rail_signals.ranging.signal import RangingSignal, modulate
 from rail_world.ranging.description import AntennaPattern, Fault, RadioDescription, StationAntenna
-from rail_world.ranging.medium import ComplexArray, Paths, RadioMedium, Reception, TrainAntennas
+from rail_world.ranging.medium import Paths, RadioMedium, Reception, TrainAntennas
 from rail_world.ranging.medium_node import antennas_of
 
 C_MPS = 299_792_458.0

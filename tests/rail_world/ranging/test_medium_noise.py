@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rail_signals.arrays import ComplexArray
 from rail_signals.ranging.signal import RangingSignal, modulate
 from rail_world.ranging.description import AntennaPattern, Fault, RadioDescription, StationAntenna
-from rail_world.ranging.medium import ComplexArray, RadioMedium, Reception, TrainAntennas
+from rail_world.ranging.medium import RadioMedium, Reception, TrainAntennas
 
 C_MPS = 299_792_458.0
 BOLTZMANN_J_PER_K = 1.380649e-23

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from rail_signals.arrays import FloatArray
 from rail_world.track_code.description import Harmonic, RailDescription, RailFault, TrackCircuit
 from rail_world.track_code.medium import RailMedium, TrainsOnRails
 from rail_world.track_code.noise import RealNoiseSource
 
-FloatArray = NDArray[np.float64]
 RATE_HZ, TICK_S, SAMPLES = 16_000.0, 0.1, 1600
 LENGTH_M = 500.0
 ONE = np.ones(SAMPLES)

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import j0, jv
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.train_radio.mimo_fading import MimoFading
 from rail_signals.train_radio.path_loss import path_loss_db
@@ -18,9 +19,6 @@ from rail_world.train_radio.description import BaseStation, CbtcDescription, Cbt
 from rail_world.train_radio.fading import LinkFading, node_count
 from rail_world.train_radio.links import COLUMNS, Run
 from rail_world.train_radio.medium import Burst, CbtcMedium, Links
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 RATE_HZ, TICK_S, SAMPLES = 400e3, 0.1, 40_000
 DOWN_HZ, UP_HZ = {1: 2.412e9, 2: 2.422e9}, {1: 2.452e9, 2: 2.462e9}

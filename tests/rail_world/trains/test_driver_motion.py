@@ -7,8 +7,9 @@ import pytest
 from pydantic import ValidationError
 
 from rail_world.errors import WorldDataError
-from rail_world.line.description import JunctionDescription, TrackDescription, TrainDescription
+from rail_world.line.description import JunctionDescription, TrackDescription
 from rail_world.line.network import Network, build_network
+from rail_world.trains.description import TrainDescription
 from rail_world.trains.drive_command import DriveCommand
 from rail_world.trains.motion import TrainMotion
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rail_world.line.description import TrainDescription
 from rail_world.line.network import Network
 from rail_world.line.ttobench import load_ttobench
+from rail_world.trains.description import TrainDescription
 from rail_world.trains.motion import TrainMotion
 
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from rail_world.line.description import TrackDescription, VehicleDescription
+from rail_world.line.description import TrackDescription
 from rail_world.line.network import Network, build_network
+from rail_world.trains.description import VehicleDescription
 from rail_world.trains.vehicle import GRAVITY_MPS2, Extent, LineForces, Vehicle, curve_resistance
 
 

@@ -18,7 +18,7 @@ from rclpy.task import Future
 from rich.console import Console
 
 from rail_corridor.equipment.registry import kind_of
-from rail_corridor.run.middleware import discover_on
+from rail_corridor.middleware.discovery import discover_on
 from rail_msgs_py.stamps import to_ns
 from rail_msgs_py.standalone import spin
 from rail_msgs_py.topics.qos import LATCHED

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 # One thread for linear algebra: two cores are shared by many nodes, and the bits of a sum must
 # not depend on how many threads computed it. Has to be set before NumPy is loaded.
@@ -28,12 +28,18 @@ from .usage import (
 )
 from .workshop import add_to as add_workshop
 
+if TYPE_CHECKING:
+    from rail_corridor.scenario.model import Scenario
+
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     help="A railway signalling corridor on ROS 2, at waveform level.",
 )
+
+_PLACEMENTS: tuple[Literal["one", "site", "node"], ...] = ("one", "site", "node")
+_PARTS: tuple[Literal["wayside", "onboard"], ...] = ("wayside", "onboard")
 
 SeedOption = Annotated[
     int | None, typer.Option("--seed", help="Seed of every random draw.", metavar="N")
@@ -62,7 +68,7 @@ def _load(
     trains: int | None,
     zone_length: float | None,
     reverse: bool,
-) -> object:
+) -> Scenario:
     from rail_corridor.loading.loader import load_scenario
     from rail_corridor.loading.overrides import Overrides
 
@@ -148,8 +154,8 @@ def run(
     """Run a corridor, and report."""
     import math
 
-    check_choice("--processes", processes, ("one", "site", "node"))
-    check_choice("--only", only, ("wayside", "onboard"))
+    placement = check_choice("--processes", processes, _PLACEMENTS)
+    part = check_choice("--only", only, _PARTS)
     if not (math.isfinite(rate) and 0.0 <= rate <= 1e6):
         raise UsageError(f"--rate: {rate}: must be from 0 to 1e6")
     if not (math.isfinite(timeout) and 0.5 <= timeout <= 3600.0):
@@ -169,10 +175,10 @@ def run(
     from rail_corridor.run.launcher import RunOptions
     from rail_corridor.run.launcher import run as run_corridor
 
-    options = RunOptions(  # type: ignore[arg-type]
+    options = RunOptions(
         rate,
-        processes,
-        only,
+        placement,
+        part,
         report,
         timeout,
         tuple(external or ()),
@@ -180,7 +186,7 @@ def run(
         record,
         rate > 0.0 if switches is None else switches,
     )
-    raise typer.Exit(run_corridor(loaded, options, Console()))  # type: ignore[arg-type]
+    raise typer.Exit(run_corridor(loaded, options, Console()))
 
 
 @app.command()
@@ -200,7 +206,7 @@ def check(
 
     from rail_corridor.loading.summary import print_summary
 
-    print_summary(loaded, Console())  # type: ignore[arg-type]
+    print_summary(loaded, Console())
 
 
 @app.command()
@@ -274,7 +280,9 @@ def main() -> None:
     from rail_corridor.errors import InputError
 
     # Typer brings its own command-line parser, or uses click: its errors are known by name.
-    usage_errors = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
+    usage_errors: Any = next(
+        c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"
+    )
 
     try:
         code = app(standalone_mode=False)

@@ -98,7 +98,7 @@ def sweep(
     from rich.console import Console
 
     from rail_corridor.run.child_run import RunFailedError
-    from rail_corridor.studies.link_margin.points import run_link_margin
+    from rail_corridor.studies.link_margin.sweep import run_link_margin
 
     try:
         run_link_margin(out, quick, Console(), seeds)

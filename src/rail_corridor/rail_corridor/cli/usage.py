@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
@@ -32,10 +32,17 @@ def check_writable(option: str, path: Path) -> None:
         raise UsageError(f"{option}: {path}: cannot be written")
 
 
-def check_choice(option: str, value: str | None, choices: tuple[str, ...]) -> None:
-    """Raise UsageError if a value is none of those that are offered; None is no value."""
-    if value is not None and value not in choices:
-        raise UsageError(f"{option}: {value!r}: must be one of {', '.join(choices)}")
+Choice = TypeVar("Choice", bound=str)
+
+
+def check_choice(option: str, value: str | None, choices: tuple[Choice, ...]) -> Choice | None:
+    """The choice that a value names, None for no value; UsageError for what is not offered."""
+    if value is None:
+        return None
+    for choice in choices:
+        if choice == value:
+            return choice
+    raise UsageError(f"{option}: {value!r}: must be one of {', '.join(choices)}")
 
 
 def check_library() -> None:

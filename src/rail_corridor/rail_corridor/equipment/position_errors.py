@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
 
-from rail_corridor.run_data import FloatArray
+from rail_signals.arrays import FloatArray
 
 from .tables import metres, new_table, percent
 

@@ -10,19 +10,19 @@ from functools import lru_cache
 from importlib.metadata import entry_points
 from typing import Final
 
+from rail_corridor.equipment.doppler.subsystem import DOPPLER
+from rail_corridor.equipment.localizer.subsystem import LOCALIZER
+from rail_corridor.equipment.ranging.subsystem import RANGING
+from rail_corridor.equipment.track_code.subsystem import TRACK_CODE
+from rail_corridor.equipment.train_bus.subsystem import TRAIN_BUS
+from rail_corridor.equipment.train_radio.subsystem import TRAIN_RADIO
 from rail_corridor.errors import InputError
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import tick, world
 from rail_msgs_py.topics.topic import Topic
 
-from .doppler.subsystem import DOPPLER
-from .localizer.subsystem import LOCALIZER
 from .node_spec import NodeKind
-from .ranging.subsystem import RANGING
 from .subsystem import Subsystem, Supervision
-from .track_code.subsystem import TRACK_CODE
-from .train_bus.subsystem import TRAIN_BUS
-from .train_radio.subsystem import TRAIN_RADIO
 
 GROUP: Final = "rail_corridor.equipment"
 #: In the order in which they are asked.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from rich.console import RenderableType
 
@@ -12,13 +12,10 @@ from rail_corridor.run_data import RecordSpec, RunData
 from rail_corridor.scenario.faults import Fault
 from rail_corridor.scenario.model import Scenario, Section
 from rail_msgs_py.topics.topic import Topic
-from rail_world.line.description import Description
+from rail_world.line.description_base import Description
 from rail_world.line.drawing import Drawing
 
 from .node_spec import NodeKind, NodeSpec
-
-if TYPE_CHECKING:
-    from rail_corridor.view.cards import CardSource
 
 
 @dataclass(frozen=True)
@@ -169,8 +166,4 @@ class Subsystem:
 
     def tables(self, report: Mapping[str, Any]) -> Iterable[RenderableType]:
         """What the report shows of it on the screen."""
-        return ()
-
-    def cards(self) -> Sequence[CardSource]:
-        """Cards of the live page, for each train."""
         return ()

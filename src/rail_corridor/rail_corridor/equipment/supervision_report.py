@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_corridor.run_data import FloatArray, RunData
+from rail_corridor.run_data import RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.world import COMMAND, STATE
+from rail_signals.arrays import FloatArray
 
 #: Speed above the limit that counts as overspeed [m/s].
 OVERSPEED_MPS = 0.5

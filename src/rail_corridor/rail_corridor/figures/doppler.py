@@ -7,15 +7,13 @@ from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plotting import COLOURS, Picture
 from rail_corridor.studies.accuracy import accuracy_of, draw_line
+from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.doppler.patent_functions import CircularSection, MixedSection, StraightSection
-
-FloatArray = NDArray[np.float64]
 
 CARRIER_HZ: Final = 2.6e9
 SPEED_MPS: Final = 300.0 / 3.6

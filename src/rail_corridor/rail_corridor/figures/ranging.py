@@ -6,12 +6,12 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from rail_corridor.equipment.ranging.layout import Zone, layout_of
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plotting import COLOURS, Picture
 from rail_corridor.scenario.model import Scenario
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.ranging.bounds import two_way_range_variance_bound
 from rail_signals.ranging.comparators import (
@@ -25,10 +25,8 @@ from rail_signals.ranging.phase_range import (
     range_to_phase_rad,
 )
 from rail_signals.ranging.receiver import LineReceiver
-from rail_signals.ranging.signal import ComplexArray, RangingSignal, discriminate, modulate, tone_of
+from rail_signals.ranging.signal import RangingSignal, discriminate, modulate, tone_of
 from rail_signals.ranging.transponder import reply_lag_rad
-
-FloatArray = NDArray[np.float64]
 
 TONE_HZ: Final = 375e3
 _RATE_HZ: Final = 75e6  # 200 samples in a period

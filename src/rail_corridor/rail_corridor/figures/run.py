@@ -14,13 +14,13 @@ from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.equipment.ranging.report import position_errors
 from rail_corridor.plotting import COLOURS, Picture
 from rail_corridor.report.from_recording import RecordedRun
-from rail_corridor.run_data import FloatArray
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.ranging import VRS_CHANNEL
 from rail_msgs_py.topics.track_code import CODE_SENT
 from rail_msgs_py.topics.train_radio import ATP_STATE
 from rail_msgs_py.topics.world import COMMAND, STATE
+from rail_signals.arrays import FloatArray
 
 from .ranging import pair_colour
 
@@ -40,13 +40,14 @@ class RunPicture(NamedTuple):
 def _states(run: RecordedRun, index: int) -> FloatArray:
     """State of a train [tick, column], NaN while it is not on the line."""
     recording = run.intake.recording
-    state = recording[STATE].upto(recording.ticks)[:, index].copy()
+    state: FloatArray = recording[STATE].upto(recording.ticks)[:, index].copy()
     state[~(state[:, STATE.index["on_line"]] > 0.0)] = np.nan
     return state
 
 
 def _times_s(run: RecordedRun) -> FloatArray:
-    return np.arange(1, run.intake.recording.ticks + 1) * run.scenario.tick_s
+    ticks = np.arange(1, run.intake.recording.ticks + 1, dtype=np.float64)
+    return ticks * run.scenario.tick_s
 
 
 def furthest(run: RecordedRun) -> int:

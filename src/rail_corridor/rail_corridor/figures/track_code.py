@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from scipy.signal import hilbert, sosfilt, square
 
 from rail_corridor.plotting import Picture
+from rail_signals.arrays import FloatArray
 from rail_signals.track_code.demodulator import DemodulatorChain
 from rail_signals.track_code.filters import dc_rejecter, post_demodulation_filter, response
 from rail_signals.track_code.profile import load_profile
@@ -17,8 +17,6 @@ from rail_signals.track_code.signal import FmTransmitter
 from rail_signals.track_code.word import encode
 
 from . import track_code_errors as track_code_error_figure
-
-FloatArray = NDArray[np.float64]
 
 BOARD_RATE_HZ = 50_000.0  # 20 us, the sampling time of the document's board
 NOISE_HZ = 8000.0
@@ -28,7 +26,7 @@ def three_tones() -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and |X| of three tones of amplitude 1 in 100 samples at 100 Hz (Fig. 5)."""
     time_s = np.arange(100) / 100.0
     wave = sum(np.sin(2 * np.pi * tone_hz * time_s) for tone_hz in (20.0, 25.0, 30.0))
-    return np.fft.rfftfreq(100, 0.01), np.abs(np.fft.rfft(wave))
+    return np.asarray(np.fft.rfftfreq(100, 0.01), float), np.abs(np.fft.rfft(wave))
 
 
 def noisy_wave(frequency_hz: float, samples: int, *, squared: bool = False) -> FloatArray:
@@ -41,7 +39,8 @@ def noisy_wave(frequency_hz: float, samples: int, *, squared: bool = False) -> F
 
 def board_spectrum(wave: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and |X| of samples of the document's board."""
-    return np.fft.rfftfreq(len(wave), 1 / BOARD_RATE_HZ), np.abs(np.fft.rfft(wave))
+    frequencies_hz = np.fft.rfftfreq(len(wave), 1 / BOARD_RATE_HZ)
+    return np.asarray(frequencies_hz, float), np.abs(np.fft.rfft(wave))
 
 
 def filtered(wave: FloatArray) -> FloatArray:

@@ -9,17 +9,15 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from rail_corridor.plotting import COLOURS
+from rail_signals.arrays import FloatArray
 from rail_signals.track_code.bound import best_threshold, on_off_error_probability, tone_sigma_bound
 from rail_signals.track_code.ml import MaximumLikelihoodTones
 from rail_signals.track_code.profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
 from rail_signals.track_code.receiver import FastTrackCodeReceiver
 from rail_signals.track_code.signal import FmTransmitter
 from rail_signals.track_code.word import encode
-
-FloatArray = NDArray[np.float64]
 
 CARRIER_HZ: Final = 1700.0
 RATE_HZ: Final = 16_000.0

@@ -7,9 +7,9 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
-from numpy.typing import NDArray
 
 from rail_corridor.plotting import COLOURS, Picture
+from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.consist import Deviations
 from rail_signals.train_bus.faults import (
@@ -29,8 +29,6 @@ from rail_signals.train_bus.tdr.reflectometer import Reflectometer
 from rail_signals.train_bus.tdr.response import TimeGrid, lead_in_s, reflected_wave
 from rail_signals.train_bus.train import train_consist
 from rail_signals.train_bus.transmitter import Transmitter
-
-FloatArray = NDArray[np.float64]
 
 RISE_S: Final = 10e-9
 IMPEDANCE_OHM: Final = 120.0

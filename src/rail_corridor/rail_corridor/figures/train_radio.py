@@ -6,15 +6,12 @@ from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from rail_corridor.plotting import COLOURS, Picture
 from rail_signals.train_radio.ber.closed_form import SCHEMES, error_rate
 from rail_signals.train_radio.ber.link import DiversityLink
 from rail_signals.train_radio.ber.monte_carlo import Result, until
 from rail_signals.train_radio.space_time_block import Scheme
-
-FloatArray = NDArray[np.float64]
 
 LABELS: Final = {
     "siso": ("SISO", "o", "-"),

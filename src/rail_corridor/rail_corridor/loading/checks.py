@@ -10,7 +10,7 @@ from rail_corridor.scenario.faults import TrainStop, WheelSlip
 from rail_corridor.scenario.model import Scenario
 from rail_corridor.scenario.timetable import CLEARING_TIME_S
 from rail_world.errors import WorldDataError
-from rail_world.line.description import TrainDescription
+from rail_world.trains.description import TrainDescription
 from rail_world.trains.motion import TrainMotion
 
 

@@ -11,11 +11,11 @@ from pydantic import ValidationError
 
 from rail_corridor.errors import InputError, from_validation
 from rail_corridor.scenario.model import Scenario
+from rail_corridor.yaml_file import load_yaml
 
 from .checks import check_scenario
 from .overrides import Overrides, apply_overrides, blame_override, turned_round
 from .schema import field_names, parse_scenario, scenario_model
-from .yaml_file import load_yaml
 
 _SCENARIOS: Final = Path(str(resources.files("rail_corridor.loading"))) / "builtin"
 

@@ -10,8 +10,8 @@ from typing import Any, Final
 from rail_corridor.equipment.registry import subsystems
 from rail_corridor.equipment.subsystem import SectionOption
 from rail_corridor.errors import InputError
-from rail_world.line.description import TrainDescription
 from rail_world.line.network import Network
+from rail_world.trains.description import TrainDescription
 
 COMMAND_LINE: Final = "command line"
 

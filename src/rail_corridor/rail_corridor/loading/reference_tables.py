@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from rail_world.line.description import Davis, VehicleDescription
+from rail_world.trains.description import Davis, VehicleDescription
 
 from .schema import models_of, scenario_model
 

@@ -16,9 +16,9 @@ import yaml
 from rail_corridor.errors import InputError
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.scenario.model import Scenario
+from rail_corridor.yaml_file import parse_yaml, read_text_file
 
 from .loader import scenario_from_data
-from .yaml_file import parse_yaml, read_text_file
 
 SCENARIO: Final = "scenario.yaml"
 _TRACKS: Final = "tracks"

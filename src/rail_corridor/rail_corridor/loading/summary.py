@@ -8,9 +8,9 @@ from rich.console import Console
 
 from rail_corridor.equipment.registry import subsystems
 from rail_corridor.scenario.model import Scenario
+from rail_corridor.yaml_file import load_yaml
 
 from .loader import builtin_scenarios
-from .yaml_file import load_yaml
 
 _MOST_TRAINS_SHOWN: Final = 24
 

@@ -7,7 +7,8 @@ from rail_corridor.scenario.faults import TrainStop as TrainStopFault
 from rail_corridor.scenario.faults import WheelSlip as WheelSlipFault
 from rail_corridor.scenario.model import Scenario
 from rail_world.line.drawing import Drawing
-from rail_world.world_file import TrainStop, WheelSlip, WorldFile
+from rail_world.trains.description import TrainStop, WheelSlip
+from rail_world.world_file import WorldFile
 
 from .announcement import announcement
 

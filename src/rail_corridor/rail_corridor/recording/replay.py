@@ -23,9 +23,9 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from rail_corridor.equipment.registry import kind_of
 from rail_corridor.errors import InputError
-from rail_corridor.loading.yaml_file import parse_yaml
-from rail_corridor.run.domain import sole_corridor
-from rail_corridor.run.middleware import discover_on
+from rail_corridor.middleware.discovery import discover_on
+from rail_corridor.middleware.domain import sole_corridor
+from rail_corridor.yaml_file import parse_yaml
 from rail_msgs_py.message_definition import message_class
 from rail_msgs_py.topics.qos import LATCHED
 from rail_msgs_py.topics.qos_text import profile_from

@@ -11,10 +11,10 @@ from geometry_msgs.msg import Point
 from visualization_msgs.msg import Marker, MarkerArray
 
 from rail_corridor.equipment.ranging.report import POSITION_COLUMNS
-from rail_corridor.run_data import FloatArray
 from rail_msgs_py.stamps import to_time
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import FloatArray
 from rail_signals.localizer.protection_level import Status
 from rail_world.line.network import Network
 from rail_world.line.track import Track
@@ -93,12 +93,11 @@ def _interval(number: int, stamp_ns: int, said: FloatArray, track: Track, *, the
     if there:
         line.scale.x = _LEAST_M
         line.pose.orientation.w = 1.0
-        ends_m = np.clip(
-            said[[LOCALIZER_STATE.index["low_m"], LOCALIZER_STATE.index["high_m"]]],
-            0.0,
-            track.length_m,
+        low_m, high_m = (
+            min(max(float(said[LOCALIZER_STATE.index[end]]), 0.0), track.length_m)
+            for end in ("low_m", "high_m")
         )
-        pose = track.pose(np.linspace(*ends_m, _INTERVAL_POINTS))
+        pose = track.pose(np.linspace(low_m, high_m, _INTERVAL_POINTS))
         places = zip(pose.x_m.tolist(), pose.y_m.tolist(), pose.z_m.tolist(), strict=True)
         line.points = [Point(x=x, y=y, z=z) for x, y, z in places]
     return line

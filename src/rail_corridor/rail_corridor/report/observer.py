@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from std_msgs.msg import Header
 
 from rail_corridor.plan.plan import REPORT, Plan
@@ -17,7 +18,9 @@ from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.topics.ranging import POSITION
 from rail_msgs_py.topics.tick import FAILED, OBSERVED
+from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.world import STATE, TRAIN_MARKERS
+from rail_signals.arrays import FloatArray
 
 from .intake import Intake
 from .map_markers import train_markers
@@ -124,12 +127,17 @@ class Observer(CorridorNode):
         if tick < 0:
             return
         recording = self.intake.recording
-        records = [recording[STATE], recording[POSITION]]
-        if LOCALIZER_STATE in recording:
-            records.append(recording[LOCALIZER_STATE])
-        rows = [record.upto(tick + 1)[tick] for record in records]
-        stamp_ns = tick * self._tick_ns
+
+        def rows(topic: Topic) -> FloatArray:
+            return np.asarray(recording[topic].upto(tick + 1)[tick])
+
         markers = train_markers(
-            stamp_ns, recording.trains, self._network, *rows, first_tracks=self._first_tracks
+            tick * self._tick_ns,
+            recording.trains,
+            self._network,
+            rows(STATE),
+            rows(POSITION),
+            rows(LOCALIZER_STATE) if LOCALIZER_STATE in recording else None,
+            first_tracks=self._first_tracks,
         )
         self._markers.publish(markers)

@@ -8,6 +8,7 @@ import shutil
 import signal
 import tempfile
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,8 +18,9 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 from rail_corridor.equipment.registry import node_kinds
 from rail_corridor.errors import InputError
 from rail_corridor.loading.scenario_files import files_of
+from rail_corridor.middleware.discovery import discover_on
+from rail_corridor.middleware.domain import sole_corridor
 from rail_corridor.plan.plan import REPORT, WORLD, Placement, Plan, check_external, make_plan
-from rail_corridor.processes import ProcessGroup, remove_orphaned_segments
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
 from rail_corridor.report.report import make_report, print_report, report_text, write_report
@@ -26,14 +28,14 @@ from rail_corridor.scenario.model import Scenario
 
 from .bystander import FULL_NAME as BYSTANDER
 from .bystander import Bystander
-from .domain import sole_corridor
 from .host import make_context, make_nodes, run_nodes
 from .kills import Executioner, Kill, check_kills
-from .middleware import discover_on
+from .processes import ProcessGroup, remove_orphaned_segments
 
 if TYPE_CHECKING:
     from rail_corridor.equipment.node_spec import NodeSpec
-    from rail_corridor.recording.run_recording import RunRecording
+
+    from .run_recording import RunRecording
 
 #: More processes than this to a core cost more than they show.
 MOST_PROCESSES_PER_CORE = 8
@@ -156,7 +158,7 @@ class _Run:
         }
         try:
             for name, specs in self._groups.items() if not self._here else ():
-                self._processes.start(name, lambda name=name, specs=specs: self._child(name, specs))
+                self._processes.start(name, partial(self._child, name, specs))
             self._watch()
         finally:
             self._processes.stop()
@@ -176,7 +178,7 @@ class _Run:
 
     def _record(self, path: Path, nodes: int) -> RunRecording:
         """Start the recorder, before any other process and before ROS."""
-        from rail_corridor.recording.run_recording import RunRecording
+        from .run_recording import RunRecording
 
         plan = self._plan
         beginning = Beginning(plan.scenario, plan.seed, nodes, len(self._groups))
@@ -218,7 +220,7 @@ class _Run:
         if tap is not None and self._options.with_strangers:
             ours = {spec.name for specs in self._groups.values() for spec in specs}
             others = [spec.name for spec in self._plan.nodes if spec.name not in ours]
-            from rail_corridor.recording.run_recording import SHARED
+            from .run_recording import SHARED
 
             nodes.append(Bystander(others, tap.open, SHARED, context=context))
         executor = EventsExecutor(context=context)

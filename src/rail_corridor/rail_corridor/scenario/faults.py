@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from rail_world.line.description import Description, Name, Number
+from rail_world.line.description_base import Description, Name, Number
 
 from .section_fields import Time
 

@@ -9,16 +9,12 @@ from functools import cached_property
 from typing import Any, Final, Generic, TypeVar, cast
 
 from pydantic import Field, SerializeAsAny, model_validator
+from typing_extensions import Self
 
-from rail_world.line.description import (
-    Description,
-    JunctionDescription,
-    Name,
-    Number,
-    TrackDescription,
-    TrainDescription,
-)
+from rail_world.line.description import JunctionDescription, TrackDescription
+from rail_world.line.description_base import Description, Name, Number
 from rail_world.line.network import Network, build_network
+from rail_world.trains.description import TrainDescription
 
 from .faults import Fault
 from .section_fields import Whole
@@ -85,7 +81,7 @@ class Scenario(Description):
             self.derived[function] = function(self)
         return cast("Derived", self.derived[function])
 
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Any:
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Copy with changes; what was derived is not taken along."""
         copy = super().model_copy(update=update, deep=deep)
         for name in copy.__dict__.keys() - type(self).model_fields.keys():

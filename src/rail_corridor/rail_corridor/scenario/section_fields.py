@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
-from rail_world.line.description import Number
+from rail_world.line.description_base import Number
 
 
 def _not_a_bool(value: object) -> object:

@@ -6,7 +6,8 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from rail_world.line.description import Description, Name, Number, TrainDescription
+from rail_world.line.description_base import Description, Name, Number
+from rail_world.trains.description import TrainDescription
 
 from .section_fields import Whole
 

@@ -10,7 +10,6 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
@@ -19,8 +18,7 @@ from rail_corridor.equipment.doppler.section import REFERENCES
 from rail_corridor.errors import InputError
 from rail_corridor.plotting import COLOURS, STYLE
 from rail_corridor.scenario.model import Scenario
-
-FloatArray = NDArray[np.float64]
+from rail_signals.arrays import FloatArray
 
 #: Worse than this is drawn at the upper edge [m].
 _WORST_M = 100.0

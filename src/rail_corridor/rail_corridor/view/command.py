@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from rail_corridor.errors import InputError
-from rail_corridor.run.middleware import discover_on
+from rail_corridor.middleware.discovery import discover_on
 
 #: Domains whose ports lie within the range of a host's.
 MOST_DOMAIN = 232

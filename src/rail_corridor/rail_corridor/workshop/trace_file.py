@@ -18,14 +18,13 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rail_corridor.errors import InputError
-from rail_corridor.loading.yaml_file import read_text_file
+from rail_corridor.yaml_file import read_text_file
+from rail_signals.arrays import FloatArray
 
 from .touchstone_file import MeasuredSpectrum, parse_touchstone
 
-FloatArray = NDArray[np.float64]
 Quantity = Literal["reflection", "ohms", "volts"]
 
 _TIMES: Final = {"time_s": 1.0, "time_us": 1e-6, "time_ns": 1e-9}

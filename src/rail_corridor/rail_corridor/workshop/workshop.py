@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
 from rail_corridor.errors import InputError
+from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.consist import Consist
 from rail_signals.train_bus.fault_words import fault_words, size_of
 from rail_signals.train_bus.line import Termination
@@ -33,7 +33,6 @@ from rail_signals.train_bus.train import cable_consist, train_consist, train_pro
 from .touchstone_file import MeasuredSpectrum
 from .trace_file import MeasuredTrace, read_measurement
 
-FloatArray = NDArray[np.float64]
 End = Literal["terminated", "open", "short"]
 
 #: What is at the far end, and as what it is read.

@@ -21,14 +21,11 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rail_signals.train_bus.fault_words import fault_words, size_of
 from rail_signals.train_bus.tdr.interpretation import Finding
 from rail_signals.train_bus.tdr.reflectometer import Reflectogram
 from rail_signals.train_bus.tdr.traces import TraceSummary, summarise
-
-FloatArray = NDArray[np.float64]
 
 _SAME_SIGMAS: Final = 5.0
 #: Noise that has risen by this share makes an interpretation worth while.

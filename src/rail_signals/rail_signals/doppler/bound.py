@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.ranging.signal import FloatArray
 
 from .surveyed_line import SurveyedLine
 from .tone_plan import TonePlan

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 
 Shifts: TypeAlias = tuple[float, float]
 """Shifts of the first and the second station [Hz], the receiver's offset taken off."""

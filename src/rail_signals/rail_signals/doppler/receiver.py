@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.ranging.bounds import complex_tone_frequency_variance_bound
-from rail_signals.ranging.signal import ComplexArray, FloatArray
 
 from .tone_fit import PHASE_TERMS, PIECES, ToneFit, ToneFitter
 from .tone_plan import TonePlan

@@ -18,9 +18,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.phasors import cis
-from rail_signals.ranging.signal import ComplexArray, FloatArray
 
 from .tone_plan import TonePlan
 

@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
+from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.ranging.signal import FloatArray
 
 from .shift_cost import Heard, ShiftCost, Symmetric, inverse
 from .surveyed_line import SurveyedLine

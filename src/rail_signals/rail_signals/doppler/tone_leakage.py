@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 
 
 class Leakage:

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.phasors import cis
-from rail_signals.ranging.signal import ComplexArray, FloatArray
 
 from .signal import block_times_s
 from .tone_plan import TonePlan

@@ -11,9 +11,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-
-from .signal import FloatArray
 
 
 def tone_phase_variance_bound(snr: ArrayLike, samples: ArrayLike, index: ArrayLike) -> FloatArray:

@@ -13,7 +13,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .signal import FloatArray, wrap_to_turn
+from rail_signals.arrays import FloatArray
+
+from .signal import wrap_to_turn
 
 
 def and_pulse_width_s(

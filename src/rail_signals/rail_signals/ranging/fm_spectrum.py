@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import jv
 
-from .signal import FloatArray, RangingSignal
+from rail_signals.arrays import FloatArray
+
+from .signal import RangingSignal
 
 LOST_INFORMATION = 3e-3
 """Share of the Fisher information of each tone that the kept lines may leave out."""

@@ -13,10 +13,11 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.phasors import cis
 
 from .fm_spectrum import LineSpectrum
-from .signal import ComplexArray, FloatArray, RangingSignal
+from .signal import RangingSignal
 
 RealArray: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import erfc
 
+from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 
-from .signal import FloatArray, wrap_to_turn
+from .signal import wrap_to_turn
 
 Comparator = Literal["and", "quadrature"]
 

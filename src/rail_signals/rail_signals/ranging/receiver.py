@@ -14,10 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rail_signals.arrays import ComplexArray, FloatArray
+
 from .detector import detection_share
 from .fm_spectrum import line_spectrum
 from .offset_search import OffsetSearch, RealArray
-from .signal import ComplexArray, FloatArray, RangingSignal
+from .signal import RangingSignal
 from .tone_fit import LineFit
 
 MAX_SNR = 1e9

@@ -20,14 +20,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import jv
 
-FloatArray: TypeAlias = NDArray[np.float64]
-ComplexArray: TypeAlias = NDArray[np.complex128]
+from rail_signals.arrays import ComplexArray, FloatArray
 
 ALIASED_POWER_LIMIT = 1e-8
 """Largest share of the FM power that may lie past the Nyquist frequency."""

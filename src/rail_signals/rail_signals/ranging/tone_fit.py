@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.phasors import cis
 
 from .fm_spectrum import LineSpectrum
-from .signal import ComplexArray, FloatArray, RangingSignal
+from .signal import RangingSignal
 
 _DIRECT_PERIOD = 64
 _FEW = 4

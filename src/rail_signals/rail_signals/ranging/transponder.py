@@ -13,9 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rail_signals.arrays import ComplexArray, FloatArray
+
 from .phase_range import range_per_radian_m
 from .receiver import ToneEstimate
-from .signal import ComplexArray, FloatArray, RangingSignal, modulate
+from .signal import RangingSignal, modulate
 
 
 def transpond(estimate: ToneEstimate, signal: RangingSignal, delay_s: ArrayLike) -> ComplexArray:

@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
+from rail_signals.arrays import ComplexArray, FloatArray
+
 from .demodulator import STOP_HZ, DemodulatorChain
 from .filters import DEMODULATED_RATE_HZ, SectionFilter, dc_rejecter, response
 
-FloatArray: TypeAlias = NDArray[np.float64]
 SingleArray: TypeAlias = NDArray[np.float32]
-ComplexArray: TypeAlias = NDArray[np.complex128]
 
 # Of the first filter. Its ripple is made good by the second.
 _FRONT_DB = 55.0

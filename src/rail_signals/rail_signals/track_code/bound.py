@@ -29,7 +29,7 @@ from scipy.optimize import brentq
 from scipy.special import i0e
 from scipy.stats import ncx2
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 
 
 def phase_basis(tones_hz: ArrayLike, samples: int, sample_rate_hz: float) -> FloatArray:

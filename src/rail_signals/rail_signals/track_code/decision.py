@@ -13,16 +13,16 @@ detection that their conclusion asks for. A word is valid if
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rail_signals.arrays import BoolArray, FloatArray
+
 from .profile import TrackCodeProfile
 from .word import decode
 
-FloatArray: TypeAlias = NDArray[np.float64]
-BoolArray: TypeAlias = NDArray[np.bool_]
 Number = TypeVar("Number", bound=np.generic)
 
 MOST_NOISE = 0.1

@@ -11,11 +11,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import signal
+
+from rail_signals.arrays import ComplexArray, FloatArray
 
 from .filters import (
     DEMODULATED_RATE_HZ,
@@ -28,9 +29,6 @@ from .filters import (
     settling_s,
 )
 from .profile import SLOT_RATE_HZ, TrackCodeProfile
-
-FloatArray: TypeAlias = NDArray[np.float64]
-ComplexArray: TypeAlias = NDArray[np.complex128]
 
 PASS_HZ = 150.0
 """Half width of the band around the carrier that is let through [Hz]."""

@@ -15,14 +15,12 @@ demodulator and a Butterworth DC rejecter (equation 10), then halve the rate fro
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import signal
 
-FloatArray: TypeAlias = NDArray[np.float64]
-ComplexArray: TypeAlias = NDArray[np.complex128]
+from rail_signals.arrays import ComplexArray, FloatArray
 
 DEMODULATED_RATE_HZ = 128.0
 """Rate at which the DC rejecter works [Hz]."""

@@ -23,17 +23,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
 
 from .bound import phase_basis, tone_sigma_bound
 from .ml_start import ROUNDS, Outward, turned
-
-BoolArray: TypeAlias = NDArray[np.bool_]
 
 _LEAST_COHERENCE = 0.3
 # Misses of the nominal deviations that 27 true tones have, 20 on average, with a margin.

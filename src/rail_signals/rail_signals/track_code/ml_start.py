@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 
 # Rounds of starts: the density [dB Hz] their gains are made for, where in the slot they begin,
 # and whether they know nothing or the best so far.

@@ -18,6 +18,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
+from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
+
 from .block_demodulator import FastDemodulator
 from .decision import MOST_NOISE, Decision, no_slot, read_only
 from .profile import SLOT_RATE_HZ, TrackCodeProfile
@@ -30,10 +32,7 @@ from .reference_receiver import (
     input_fault,
 )
 
-FloatArray: TypeAlias = NDArray[np.float64]
 SingleArray: TypeAlias = NDArray[np.float32]
-ComplexArray: TypeAlias = NDArray[np.complex128]
-BoolArray: TypeAlias = NDArray[np.bool_]
 RealArray: TypeAlias = NDArray[np.floating]
 
 _BATCH_HOPS = 2048

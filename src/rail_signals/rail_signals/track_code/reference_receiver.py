@@ -16,18 +16,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from rail_signals.arrays import ComplexArray, FloatArray
 
 from .decision import Confirmation, Decision, judge_levels, no_slot, read_only
 from .demodulator import Demodulator, DemodulatorChain
 from .profile import SLOT_RATE_HZ, TrackCodeProfile
 from .tone_levels import ToneEstimator, tone_columns, tone_estimator
-
-FloatArray: TypeAlias = NDArray[np.float64]
-ComplexArray: TypeAlias = NDArray[np.complex128]
 
 MOST_AT_PEAK = 0.05
 """Share of samples of a hop that may be at its peak value; an unclipped wave has a few."""

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import solve_triangular, toeplitz
 
-FloatArray: TypeAlias = NDArray[np.float64]
-ComplexArray: TypeAlias = NDArray[np.complex128]
+from rail_signals.arrays import ComplexArray, FloatArray
+
 NoiseSpectrum: TypeAlias = Callable[[FloatArray], FloatArray]
 """One-sided power density over frequency [Hz]: float [n] -> float [n]."""
 

@@ -9,14 +9,13 @@ each other in four places or more, so one, two or three wrong bits never pass.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from rail_signals.arrays import BoolArray
 
 from .profile import CRC_FIELD, TrackCodeProfile
-
-BoolArray: TypeAlias = NDArray[np.bool_]
 
 
 def crc(polynomial: int, message: int) -> int:

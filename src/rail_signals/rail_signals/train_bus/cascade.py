@@ -18,7 +18,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 
 from .cable import Cable, WaveConstants
 from .line import Coupler, Element, Line, Section, SeriesElement, ShuntElement, Stub

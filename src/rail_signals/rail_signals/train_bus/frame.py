@@ -23,12 +23,10 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import erf, erfc
 
-from rail_signals.ranging.signal import FloatArray
-
-BoolArray = NDArray[np.bool_]
+from rail_signals.arrays import BoolArray, FloatArray
 
 PREAMBLE_BITS: Final = 16
 DELIMITER_HALVES: Final = (-1, 1, 1, -1, -1, -1, 1, -1, 1, 1, -1, 1, -1, -1, 1, 1)

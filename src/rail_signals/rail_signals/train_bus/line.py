@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rail_signals.ranging.signal import ComplexArray
+from rail_signals.arrays import ComplexArray
 
 from .cable import Cable
 

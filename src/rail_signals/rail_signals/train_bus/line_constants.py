@@ -24,8 +24,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.ranging.signal import ComplexArray, FloatArray
 
 DB_PER_NEPER: Final = 20 / math.log(10)
 """One neper in decibels, 8.68589; S2 rounds it to 8.686."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 
 from .transmitter import BIT_RATE_HZ, LOADS
 

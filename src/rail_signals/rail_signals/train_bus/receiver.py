@@ -23,9 +23,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import BoolArray, FloatArray
 
-from .frame import BoolArray, BusFrameFormat, checked_payload
+from .frame import BusFrameFormat, checked_payload
 
 # Places between two samples at which the start is looked for, and samples by which a bit that
 # begins between two of them is longer.

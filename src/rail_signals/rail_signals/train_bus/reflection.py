@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 
 
 def reflection_coefficient(load_ohm: ArrayLike, impedance_ohm: ArrayLike) -> ComplexArray:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 
 from .consist import Consist
 from .line import Element, Line, Section

@@ -28,9 +28,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rail_signals.arrays import ComplexArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.phasors import cis
-from rail_signals.ranging.signal import ComplexArray
 
 _CELLS_PER_WAVELENGTH = 8
 _TERMS = 9

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_signals.ranging.signal import ComplexArray
+from rail_signals.arrays import ComplexArray
 
 from .burst import RadioBurstFormat
 from .symbol_mapping import BitArray

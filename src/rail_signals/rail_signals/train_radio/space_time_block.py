@@ -30,7 +30,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)

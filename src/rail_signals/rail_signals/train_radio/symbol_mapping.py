@@ -23,7 +23,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 
 BitArray: TypeAlias = NDArray[np.uint8]
 

@@ -11,9 +11,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rail_signals.arrays import FloatArray
 
 #: How many zones away a train is still looked for.
 NEIGHBOURHOOD = 3

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.delay import fractional_delay
 from rail_signals.phasors import cis
@@ -36,9 +37,6 @@ from rail_world.ranging.medium import THERMAL_NOISE_DBM_PER_HZ
 from rail_world.ranging.noise import NoiseSource
 
 from .description import ReferenceDescription
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _STAGE = 21  # of the noise; the ranging radio has 1 and 2, the train radio 11 and 12
 _OFFSET_STREAM = 22

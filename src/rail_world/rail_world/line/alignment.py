@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import fresnel
 
-FloatArray = npt.NDArray[np.float64]
+from rail_signals.arrays import FloatArray
 
 _TOLERANCE_M = 1e-6
 # Below this estimate of the rounding error the Fresnel form is used [m].

@@ -1,4 +1,4 @@
-"""The validated description of the truth: tracks and junctions, vehicles and trains.
+"""The validated description of tracks and junctions.
 
 Every model is frozen, refuses unknown fields, and bounds every number, so that a mistake is
 reported once, with the name of its field, before anything starts.
@@ -13,37 +13,7 @@ from typing import Annotated, Final
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from rail_world.trains.description import (
-    Davis,
-    PlaceDescription,
-    ReversalDescription,
-    TrainDescription,
-    VehicleDescription,
-)
-
 from .description_base import LONGEST_TRACK_M, Chainage, Description, Length, Name, Number, Speed
-
-__all__ = [
-    "LONGEST_TRACK_M",
-    "TIGHTEST_RADIUS_M",
-    "Arc",
-    "Chainage",
-    "Clothoid",
-    "Davis",
-    "Description",
-    "JunctionDescription",
-    "Length",
-    "Name",
-    "Number",
-    "PlaceDescription",
-    "ReversalDescription",
-    "Speed",
-    "StartPose",
-    "Straight",
-    "TrackDescription",
-    "TrainDescription",
-    "VehicleDescription",
-]
 
 TIGHTEST_RADIUS_M: Final = 20.0
 _MOST_TURN_RAD = 4.0 * math.pi

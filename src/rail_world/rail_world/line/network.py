@@ -7,8 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from rail_world.errors import WorldDataError
+from rail_world.line.description import JunctionDescription, TrackDescription
 
-from .description import JunctionDescription, TrackDescription
 from .route import Leg, Route
 from .track import Track, track_from_description
 from .ttobench import load_ttobench

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .alignment import FloatArray
+from rail_signals.arrays import FloatArray
+
 from .profile import StepProfile
 from .track import Pose, Track
 

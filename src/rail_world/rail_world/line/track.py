@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .alignment import Alignment, Element, FloatArray
-from .description import Clothoid, Straight, TrackDescription
+from rail_signals.arrays import FloatArray
+from rail_world.line.description import Clothoid, Straight, TrackDescription
+
+from .alignment import Alignment, Element
 from .profile import StepProfile
 
 

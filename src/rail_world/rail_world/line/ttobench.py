@@ -17,9 +17,9 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from rail_world.errors import WorldDataError
+from rail_world.line.description import StartPose
 
 from .alignment import Alignment, Element
-from .description import StartPose
 from .track import Track, gradients_from_permil, limits_from_kmh
 from .ttobench_format import LENGTH_M, SLOPE_PERMIL, SPEED_KMH, Curvatures, TTOBenchFile
 

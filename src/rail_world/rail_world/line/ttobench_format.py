@@ -11,7 +11,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from .description import LONGEST_TRACK_M, TIGHTEST_RADIUS_M, check_increasing
+from rail_world.line.description import TIGHTEST_RADIUS_M, check_increasing
+from rail_world.line.description_base import LONGEST_TRACK_M
 
 LENGTH_M: Final = {"m": 1.0, "km": 1e3}
 SPEED_KMH: Final = {"km/h": 1.0, "m/s": 3.6}

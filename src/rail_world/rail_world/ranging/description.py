@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from rail_world.line.description_base import Description
 
 Vector = tuple[float, float, float]
 Channel = Annotated[int, Field(ge=1, le=99)]
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class AntennaPattern(_Frozen):
+class AntennaPattern(Description):
     """Directional antenna with a parabolic main lobe and a flat back (3GPP TR 36.942 form)."""
 
     gain_dbi: float = Field(12.0, ge=-20.0, le=40.0, description="on the axis")
@@ -22,7 +20,7 @@ class AntennaPattern(_Frozen):
     front_to_back_db: float = Field(30.0, ge=0.0, le=60.0, description="axis to back")
 
 
-class StationAntenna(_Frozen):
+class StationAntenna(Description):
     """One antenna of a wayside station, looking into one zone."""
 
     site: str
@@ -34,7 +32,7 @@ class StationAntenna(_Frozen):
     reach_m: float = Field(gt=0.0, description="distance past which nothing is heard")
 
 
-class Fault(_Frozen):
+class Fault(Description):
     """Something that goes wrong in the radio, from and to a simulated time."""
 
     kind: Literal["dead_station", "jam"]
@@ -46,7 +44,7 @@ class Fault(_Frozen):
     position_m: Vector = (0.0, 0.0, 0.0)
 
 
-class RadioDescription(_Frozen):
+class RadioDescription(Description):
     """Everything the radio medium knows besides where the trains are."""
 
     sample_rate_hz: float = Field(gt=0.0)

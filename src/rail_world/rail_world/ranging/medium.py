@@ -16,15 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.delay import repetition, through_paths
 from rail_signals.phasors import cis
 
 from .description import AntennaPattern, RadioDescription
 from .noise import NoiseSource
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 THERMAL_NOISE_DBM_PER_HZ = -173.975  # k T at 290 K
 _MIN_DISTANCE_M = 1.0

@@ -28,12 +28,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from rail_signals.arrays import BoolArray, FloatArray
+
 from .description import RailDescription
 from .noise import RealNoiseSource
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 
 # Circuits that a listener hears, counted along the track from its own. The second one ahead has
 # the listener's own carrier again; all others are another joint, and some 40 dB, weaker.

@@ -28,10 +28,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 from scipy.special import erfc
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.cascade import reflection_at, transfer
 from rail_signals.train_bus.consist import Consist, Deviations
@@ -45,9 +45,6 @@ from rail_world.track_code.noise import RealNoiseSource
 
 from .description import BusDescription, TrainBus
 from .fault_growth import contact, fault_of, grown
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 #: Responses kept: those of the fault as it is, and of a contact that is not firm.
 _MOST_KEPT: Final = 64

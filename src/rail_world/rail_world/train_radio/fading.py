@@ -24,11 +24,12 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.phasors import cis
 from rail_signals.train_radio.mimo_fading import MimoFading
 
-from .links import FloatArray, Run
+from .links import Run
 
 
 class LinkFading:

@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rail_signals.arrays import FloatArray
 from rail_signals.train_radio.path_loss import path_loss_db
 
 from .description import CbtcDescription
-
-FloatArray = NDArray[np.float64]
 
 DOWNLINK, UPLINK = 0, 1
 # As ``STATE.columns``, which is not for modules without ROS.

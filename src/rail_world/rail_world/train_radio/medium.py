@@ -31,12 +31,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rail_signals.arrays import FloatArray
 from rail_world.ranging.medium import THERMAL_NOISE_DBM_PER_HZ
 from rail_world.ranging.noise import NoiseSource
 
 from .description import CbtcDescription
 from .fading import LinkFading
-from .links import DOWNLINK, UPLINK, FloatArray, LinkGeometry, Links
+from .links import DOWNLINK, UPLINK, LinkGeometry, Links
 
 __all__ = ["Burst", "CbtcMedium", "Links"]
 

@@ -153,3 +153,20 @@ class TrainDescription(Description):
                 "speed_kmh: a train that waits on the line until depart_s starts from standstill"
             )
         return self
+
+
+class TrainStop(Description):
+    """A train that brakes to a stand by itself, from one time [s] to another."""
+
+    train: str
+    from_s: float
+    to_s: float
+
+
+class WheelSlip(Description):
+    """Wheels that turn `ratio` times as fast as the train runs, from one time [s] to another."""
+
+    train: str
+    from_s: float
+    to_s: float
+    ratio: float = Field(ge=0.0, le=10.0)

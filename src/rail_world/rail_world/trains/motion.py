@@ -11,12 +11,12 @@ from math import ceil, inf
 from typing import Literal
 
 from rail_world.errors import WorldDataError
-from rail_world.line.description import TrainDescription
-from rail_world.line.itinerary import Itinerary, Target
 from rail_world.line.network import Network
+from rail_world.trains.description import TrainDescription
 
 from .drive_command import DriveCommand
 from .driver import Driver
+from .itinerary import Itinerary, Target
 from .vehicle import Extent, LineForces, Vehicle
 
 State = Literal["waiting", "running", "dwelling", "arrived"]

@@ -20,9 +20,9 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 
-from rail_world.line.alignment import FloatArray
-from rail_world.line.description import VehicleDescription
+from rail_signals.arrays import FloatArray
 from rail_world.line.route import Route
+from rail_world.trains.description import VehicleDescription
 
 GRAVITY_MPS2 = 9.80665
 _PANEL_M = 10.0

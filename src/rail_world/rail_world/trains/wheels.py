@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rail_world.world_file import WheelSlip
+from rail_world.trains.description import WheelSlip
 
 
 class Wheels:

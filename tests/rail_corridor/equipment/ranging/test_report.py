@@ -12,9 +12,10 @@ from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.equipment.ranging.report import HANDOVER_DEPTH_M, train_metrics
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plan.plan import run_data_of
-from rail_corridor.run_data import FloatArray, RunData
+from rail_corridor.run_data import RunData
 from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import FloatArray
 
 SCENARIO = load_scenario("plain_line")
 LAYOUT = layout_of(SCENARIO)

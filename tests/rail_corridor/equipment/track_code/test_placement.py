@@ -13,9 +13,9 @@ from rail_corridor.equipment.track_code.nodes import circuits_ahead
 from rail_corridor.equipment.track_code.placement import circuits_of
 from rail_corridor.errors import InputError
 from rail_corridor.loading.loader import builtin_scenarios, load_scenario, scenario_from_data
-from rail_corridor.loading.yaml_file import load_yaml
 from rail_corridor.plan.plan import make_plan
 from rail_corridor.scenario.model import Scenario
+from rail_corridor.yaml_file import load_yaml
 
 DATA = load_yaml(builtin_scenarios()["follow_codes"])
 

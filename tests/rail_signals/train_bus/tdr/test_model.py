@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.consist import COMMON, CarRun, Consist, Deviations, Tolerances
 from rail_signals.train_bus.line import Coupler, Section, Stub, Termination

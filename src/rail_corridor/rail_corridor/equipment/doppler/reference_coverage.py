@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_corridor.scenario.model import Scenario
+from rail_signals.arrays import FloatArray
 from rail_signals.doppler.bound import position_bound_m, shift_information, tracked_bound_m
 from rail_signals.doppler.bound import shift_variance_hz2 as variance_of_shifts_hz2
 from rail_signals.doppler.surveyed_line import SurveyedLine
@@ -17,8 +18,6 @@ from .nodes import WALK_HZ
 from .placement import Reference, references_of
 from .section import REFERENCES, ReferencePlan
 from .world import reference_description
-
-FloatArray = NDArray[np.float64]
 
 _STEP_M = 5.0
 

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_corridor.equipment.position_errors import errors_of, fraction_of
-from rail_corridor.run_data import FloatArray, RunData
+from rail_corridor.run_data import RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import FloatArray
 
 from .reference_coverage import ReferencedTrack
 

@@ -12,7 +12,7 @@ from rail_corridor.scenario.faults import TimedFault
 from rail_corridor.scenario.model import Section
 from rail_corridor.scenario.section_fields import Frequency, Power, Whole
 from rail_signals.doppler.tone_plan import TonePlan
-from rail_world.line.description import Description, Name, Number
+from rail_world.line.description_base import Description, Name, Number
 
 
 class ReferencePlan(Description):

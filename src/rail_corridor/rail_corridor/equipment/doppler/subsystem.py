@@ -14,7 +14,7 @@ from rail_corridor.run_data import RecordSpec, RunData, per_train
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import doppler as topics
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
-from rail_world.line.description import Description
+from rail_world.line.description_base import Description
 
 from .checks import check_doppler
 from .nodes import doppler_nodes

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_corridor.equipment.position_errors import errors_of, fraction_of
-from rail_corridor.run_data import FloatArray, RunData
+from rail_corridor.run_data import RunData
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import FloatArray
 
 
 def localizer_metrics(recording: RunData, index: int) -> dict[str, Any]:

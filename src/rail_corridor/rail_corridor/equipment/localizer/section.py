@@ -7,7 +7,7 @@ from typing import Final
 from pydantic import Field
 
 from rail_corridor.scenario.model import Section
-from rail_world.line.description import Description, Number
+from rail_world.line.description_base import Description, Number
 
 
 class LocalizerPlan(Description):

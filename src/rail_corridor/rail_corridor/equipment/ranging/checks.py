@@ -9,7 +9,7 @@ from typing import Final
 from rail_corridor.errors import InputError
 from rail_corridor.scenario.model import Scenario
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_world.line.description import TrainDescription
+from rail_world.trains.description import TrainDescription
 
 from .layout import Layout, layout_of
 from .section import (

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from rail_corridor.equipment.tables import metres, new_table, percent
-from rail_corridor.run_data import FloatArray, RunData
+from rail_corridor.run_data import RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import FloatArray
 from rail_signals.ranging.bounds import two_way_range_variance_bound
 
 from .layout import Layout, Zone, layout_of
@@ -223,7 +224,7 @@ def _ranging(recording: RunData, index: int, found: PositionErrors) -> dict[str,
         allowed_m = _MISLEADING_M + _MISLEADING_SIGMAS * np.sqrt(variance_m2)
         misleading = wrong_track | (usable & (np.abs(error_m) > allowed_m))
     return {
-        "availability": _ratio(np.count_nonzero(known), int(np.count_nonzero(found.on_line))),
+        "availability": _ratio(int(np.count_nonzero(known)), int(np.count_nonzero(found.on_line))),
         "rmse_m": _rms(error_m[usable]),
         "bound_m": _root_mean(found.bound_m2[bounded]),
         "p95_m": _figure(np.quantile(np.abs(error_m[usable]), 0.95)) if usable.any() else None,

@@ -19,7 +19,7 @@ from rail_corridor.scenario.section_fields import (
 )
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.ranging.signal import RangingSignal
-from rail_world.line.description import Chainage, Description, Name, Number
+from rail_world.line.description_base import Chainage, Description, Name, Number
 
 LONGEST_ZONE_M: Final = 2000.0
 SHORTEST_ZONE_M: Final = 20.0

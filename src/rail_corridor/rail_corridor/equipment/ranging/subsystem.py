@@ -10,12 +10,13 @@ from rich.console import RenderableType
 
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext, SectionOption, Subsystem
-from rail_corridor.run_data import FloatArray, RecordSpec, RunData, in_one_message, per_train
+from rail_corridor.run_data import RecordSpec, RunData, in_one_message, per_train
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.position import figures_from_cdr as position_from_cdr
 from rail_msgs_py.topics import ranging as topics
 from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
-from rail_world.line.description import Description
+from rail_signals.arrays import FloatArray
+from rail_world.line.description_base import Description
 from rail_world.line.drawing import Drawing
 
 from .calibration import transponders_of
@@ -23,15 +24,7 @@ from .checks import check_ranging
 from .layout import layout_of
 from .nodes import ranging_nodes
 from .report import POSITION_COLUMNS, ranging_table, train_metrics
-from .section import (
-    CHANNELS,
-    RADIO,
-    SIGNAL,
-    STATIONS,
-    TRANSPONDER,
-    DeadStation,
-    Jam,
-)
+from .section import CHANNELS, RADIO, SIGNAL, STATIONS, TRANSPONDER, DeadStation, Jam
 from .summary import summary
 from .world import drawing_of, radio_of
 

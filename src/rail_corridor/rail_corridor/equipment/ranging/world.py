@@ -10,12 +10,7 @@ import numpy as np
 
 from rail_corridor.scenario.model import Scenario
 from rail_world.line.drawing import Drawing, Mast, Stretch
-from rail_world.ranging.description import (
-    AntennaPattern,
-    Fault,
-    RadioDescription,
-    StationAntenna,
-)
+from rail_world.ranging.description import AntennaPattern, Fault, RadioDescription, StationAntenna
 
 from .layout import Layout, Zone, layout_of
 from .section import CHANNELS, RADIO, SIGNAL, DeadStation, Jam

@@ -13,10 +13,11 @@ from rich.table import Table
 
 from rail_corridor.equipment.supervision_report import supervision_metrics, trains_ahead
 from rail_corridor.equipment.tables import new_table
-from rail_corridor.run_data import FloatArray, RunData
+from rail_corridor.run_data import RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import FloatArray
 
 from .placement import circuits_of
 

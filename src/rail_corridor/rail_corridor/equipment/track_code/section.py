@@ -10,7 +10,7 @@ from rail_corridor.scenario.faults import TimedFault
 from rail_corridor.scenario.model import Section
 from rail_corridor.scenario.section_fields import Frequency, Whole
 from rail_signals.track_code.profile import load_profile
-from rail_world.line.description import Description, Name, Number
+from rail_world.line.description_base import Description, Name, Number
 
 #: Profile whose fields the supervision of trains understands.
 PROFILE: Final = "tones27"

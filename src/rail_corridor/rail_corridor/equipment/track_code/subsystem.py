@@ -14,7 +14,7 @@ from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import track_code as topics
 from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT
 from rail_msgs_py.topics.world import COMMAND
-from rail_world.line.description import Description
+from rail_world.line.description_base import Description
 
 from .checks import check_codes
 from .nodes import code_nodes

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from rail_corridor.equipment.tables import new_table
-from rail_corridor.run_data import FloatArray, RunData
+from rail_corridor.run_data import RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.train_bus import BUS_LINK, BUS_LINKS, BUS_STATE
+from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.faults import KINDS
 from rail_signals.train_bus.frame import bit_error_rate
 

@@ -10,7 +10,7 @@ from rail_corridor.scenario.faults import Fault
 from rail_corridor.scenario.model import Section
 from rail_corridor.scenario.section_fields import Frequency, Time, Whole
 from rail_signals.train_bus.frame import BusFrameFormat
-from rail_world.line.description import Description, Name, Number
+from rail_world.line.description_base import Description, Name, Number
 from rail_world.train_bus.description import FaultKind
 
 #: Size of each kind where none is given; open and wrong_cable have none.

@@ -13,7 +13,7 @@ from rail_corridor.run_data import RecordSpec, RunData, in_one_message, per_trai
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import train_bus as topics
 from rail_msgs_py.topics.train_bus import BUS_LINK, BUS_LINKS, BUS_STATE
-from rail_world.line.description import Description
+from rail_world.line.description_base import Description
 
 from .checks import check_bus
 from .nodes import bus_nodes

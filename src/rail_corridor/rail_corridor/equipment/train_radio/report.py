@@ -12,12 +12,13 @@ from rich.table import Table
 
 from rail_corridor.equipment.supervision_report import supervision_metrics
 from rail_corridor.equipment.tables import new_table
-from rail_corridor.equipment.train_radio.section import CBTC
-from rail_corridor.run_data import FloatArray, RunData
+from rail_corridor.run_data import RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, CBTC_LINKS, RADIO_LINK
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import FloatArray
 
+from .section import CBTC
 from .threat_metrics import forged_authorities, report_metrics
 
 #: Fractions of its first track at which the passing of a train's front is timed.
@@ -105,7 +106,8 @@ def _link(
     changes = (channel[1:] != channel[:-1]) & (channel[:-1] > 0)
     snr = links[on_line, CBTC_LINKS.index["snr_down"]]
     snr = snr[snr > 0.0]
-    lost_s = np.count_nonzero(age_s > CBTC.of(scenario).timeout_s) if CBTC.of(scenario) else 0
+    plan = CBTC.of(scenario)
+    lost_s = 0 if plan is None else np.count_nonzero(age_s > plan.timeout_s)
     return {
         "frames": int(accepted + lost),
         "lost": int(lost),

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from rail_corridor.scenario.faults import TimedFault
 from rail_corridor.scenario.model import Section
 from rail_corridor.scenario.section_fields import Frequency, Power, Whole
-from rail_world.line.description import Chainage, Description, Name, Number
+from rail_world.line.description_base import Chainage, Description, Name, Number
 from rail_world.train_radio.threat_description import LONGEST_DELAY_S, LongestDelay, Rate, Threats
 
 

@@ -21,7 +21,7 @@ from rail_msgs_py.topics.train_radio import (
     STRIKES,
 )
 from rail_msgs_py.topics.world import COMMAND
-from rail_world.line.description import Description
+from rail_world.line.description_base import Description
 
 from .checks import check_cbtc
 from .nodes import burst_format, cbtc_nodes, controller_parameters, radio_parameters

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from rail_corridor.run_data import FloatArray, RunData
+from rail_corridor.run_data import RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, REPORTS, STRIKES
 from rail_msgs_py.train_radio.fixed_point import covering
 from rail_msgs_py.train_radio.train_report import PER_METRE, PER_METRE_COARSE, WIDEST_M
+from rail_signals.arrays import FloatArray
 
 #: Times on the wire are whole microseconds.
 _SAME_S = 2e-6

@@ -12,24 +12,16 @@ in a fade would never receive its first authority.
 from __future__ import annotations
 
 import math
-import os
-import subprocess
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
-from queue import Queue
 from typing import Any, Final
 
-from rich.console import Console
 from scipy.stats import chi2
 
 from rail_corridor.equipment.train_radio.report import PASSED_AT
-from rail_corridor.loading.schema import parse_scenario
-from rail_corridor.run.child_run import RunFailedError, faultless_report_of
 
-from .theory import Prediction, predict
+from .theory import Prediction
 
 SCHEMES: Final = ("siso", "mrc", "alamouti_2x1", "alamouti_2x2")
 #: Loss of the stretch at each point [dB]: from hardly any lost frame to more than half of them.
@@ -44,8 +36,6 @@ TICK_S: Final = 0.25
 STRETCH_FROM: Final = 0.3
 CHECKPOINTS: Final = (0.4, 0.5, 0.6)
 
-_RUN_TIMEOUT_S = 900.0
-_WORKERS = 2
 _APART_M = 350.0
 _SPACING_M = 600.0
 _REACH_M = 1.4 * _SPACING_M
@@ -227,60 +217,3 @@ def rate_interval(count: int, hours: float) -> tuple[float, float]:
     """Exact 95 % interval of a rate per hour from a count (Garwood, 1936)."""
     low = float(chi2.ppf(0.025, 2 * count)) / 2.0 if count else 0.0
     return low / hours, float(chi2.ppf(0.975, 2 * count + 2)) / 2.0 / hours
-
-
-def run_link_margin(out_dir: Path, quick: bool, console: Console, seeds: int = 1) -> list[Row]:
-    """Run the sweep; write ``link_margin.json`` and ``link_margin.png``, show the table.
-
-    Each point is run with so many seeds. Runs go two at a time in the ROS domain of this process
-    and the next one.
-
-    Raises
-    ------
-    RunFailedError
-        If runs did not come to their reports; what the others gave is written before.
-    """
-    from .figure import draw_link_margin
-    from .table import print_rows, write_rows
-
-    out_dir.mkdir(parents=True, exist_ok=True)
-    losses = {name: (each[1], *each[3:]) if quick else each for name, each in LOSSES_DB.items()}
-    first = int(os.environ.get("ROS_DOMAIN_ID") or "0")
-    domains: Queue[int] = Queue()
-    for worker in range(_WORKERS):
-        domains.put(first + worker)
-
-    failed: list[str] = []
-
-    def run(point: Point) -> dict[str, Any] | None:
-        domain = domains.get()
-        try:
-            data = scenario_data(point)
-            report = faultless_report_of(
-                data, data["name"], timeout_s=_RUN_TIMEOUT_S, domain=domain
-            )
-        except (RunFailedError, subprocess.TimeoutExpired) as error:
-            failed.append(str(error))
-            return None
-        finally:
-            domains.put(domain)
-        console.print(f"{point.name}, seed {point.seed}: done", style="dim")
-        return report
-
-    every = points(SCHEMES, losses, quick=quick)
-    each = [replace(point, seed=point.seed + n) for point in every for n in range(seeds)]
-    with ThreadPoolExecutor(_WORKERS) as pool:
-        found = list(pool.map(run, each))
-    rows = []
-    for index, point in enumerate(every):
-        reports = [r for r in found[index * seeds : (index + 1) * seeds] if r is not None]
-        if reports:
-            prediction = predict(parse_scenario(scenario_data(point)))
-            rows.append(aggregate(point, reports, prediction))
-    rows.sort(key=lambda row: (SCHEMES.index(row.scheme), row.es_n0_db))
-    write_rows(rows, out_dir / "link_margin.json")
-    draw_link_margin(rows, out_dir / "link_margin.png")
-    print_rows(rows, console)
-    if failed:
-        raise RunFailedError("; ".join(failed))
-    return rows

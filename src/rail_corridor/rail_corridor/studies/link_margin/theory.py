@@ -21,13 +21,13 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import j0
 
 from rail_corridor.equipment.train_radio.nodes import burst_format
 from rail_corridor.equipment.train_radio.section import CBTC
 from rail_corridor.equipment.train_radio.world import cbtc_description
 from rail_corridor.scenario.model import Scenario
+from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.train_radio.ber.closed_form import (
     block_fading_frame_loss,
@@ -40,8 +40,6 @@ from rail_signals.train_radio.space_time_block import Scheme
 from rail_signals.train_radio.space_time_block import scheme as by_name
 from rail_world.train_radio.links import COLUMNS
 from rail_world.train_radio.medium import CbtcMedium
-
-FloatArray = NDArray[np.float64]
 
 SPEED_MPS: Final = 80.0 / 3.6
 _BITS_PER_SYMBOL = 2

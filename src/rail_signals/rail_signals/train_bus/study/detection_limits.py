@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import ncx2
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.consist import COMMON
 from rail_signals.train_bus.faults import (

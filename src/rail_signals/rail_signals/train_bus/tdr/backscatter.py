@@ -20,7 +20,7 @@ import math
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.cascade import wave_exponential
 from rail_signals.train_bus.consist import Consist

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.consist import COMMON, Consist
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rail_signals.ranging.signal import ComplexArray
+from rail_signals.arrays import ComplexArray
 from rail_signals.train_bus.cascade import CascadePass, wave_exponential
 from rail_signals.train_bus.line import Line, ShuntElement, Stub, Termination
 

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 
 from .backscatter import Metric
 from .hypotheses import VALUES, clipped, log_expected_range, prior_cost, prior_gradient

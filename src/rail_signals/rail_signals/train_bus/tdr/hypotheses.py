@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.consist import Consist
 from rail_signals.train_bus.faults import (

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.consist import Consist, Deviations
 
 from .fit import Fit, evidence, fault_std

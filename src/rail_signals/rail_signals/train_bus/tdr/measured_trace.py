@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy import fft
 from scipy.special import ndtr
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 
 from .response import RISE_PER_SIGMA, lead_in_s
 

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.line_constants import complex_root
 

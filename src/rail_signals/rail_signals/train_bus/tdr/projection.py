@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 
 from .fit import Fit
 

@@ -25,7 +25,7 @@ from typing import Final, Literal
 import numpy as np
 from scipy import fft
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.train_bus.cascade import reflection_at
 from rail_signals.train_bus.line import Line
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.consist import COMMON, CarRun, Consist, Tolerances
 from rail_signals.train_bus.line import Coupler, Termination
 from rail_signals.train_bus.profile import BusProfile

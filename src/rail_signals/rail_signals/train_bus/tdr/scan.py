@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.train_bus.cascade import wave_exponential
 from rail_signals.train_bus.consist import COMMON, Consist
 

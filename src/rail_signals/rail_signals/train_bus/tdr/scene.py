@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 
 from .backscatter import resolution_m
 from .fields import Fields

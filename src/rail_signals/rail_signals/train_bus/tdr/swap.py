@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.train_bus.cascade import wave_exponential
 
 from .backscatter import spread_s

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 
 from .reflectometer import Reflectogram
 

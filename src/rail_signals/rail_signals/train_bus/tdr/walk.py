@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.consist import COMMON, Consist
 
 from .backscatter import Metric

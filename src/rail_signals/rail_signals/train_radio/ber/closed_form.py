@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import gammaln, ndtr
 
-from rail_signals.ranging.signal import FloatArray
+from rail_signals.arrays import FloatArray
 from rail_signals.train_radio.space_time_block import Scheme
 from rail_signals.train_radio.space_time_block import scheme as by_name
 

@@ -32,7 +32,7 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.random import BitGenerator
 from numpy.typing import NDArray
 
-from rail_signals.ranging.signal import ComplexArray
+from rail_signals.arrays import ComplexArray
 from rail_signals.train_radio.space_time_block import Scheme
 
 SingleArray: TypeAlias = NDArray[np.float32]

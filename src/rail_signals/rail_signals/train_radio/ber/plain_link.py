@@ -13,7 +13,7 @@ import numpy as np
 from numpy.random import BitGenerator, Generator
 from numpy.typing import NDArray
 
-from rail_signals.ranging.signal import ComplexArray, FloatArray
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.train_radio.space_time_block import Scheme
 
 

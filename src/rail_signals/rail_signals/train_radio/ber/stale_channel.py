@@ -30,8 +30,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import j0
 
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.ranging.signal import ComplexArray, FloatArray
 from rail_signals.train_radio.space_time_block import Scheme
 
 _NODES = 256

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rail_corridor.errors import InputError
-from rail_corridor.run.domain import sole_corridor
+from rail_corridor.middleware.domain import sole_corridor
 
 
 @pytest.fixture(autouse=True)

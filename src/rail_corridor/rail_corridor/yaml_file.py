@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import yaml
 
-from rail_corridor.errors import InputError
+from .errors import InputError
 
 LARGEST_FILE: Final = 10_000_000
 DEEPEST_NEST: Final = 30

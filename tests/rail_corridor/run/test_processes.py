@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rail_corridor.processes import Child, ProcessGroup, remove_orphaned_segments
+from rail_corridor.run.processes import Child, ProcessGroup, remove_orphaned_segments
 
 #: Only ever reached by a test that fails.
 PATIENCE_S = 20.0

@@ -12,13 +12,13 @@ from typing import Final
 
 from rail_corridor.equipment.registry import topics
 from rail_corridor.errors import InputError
-from rail_corridor.processes import ProcessGroup
+from rail_corridor.recording.frames import Attachment, attachment_frame, metadata_frame
+from rail_corridor.recording.pipe_tap import CLOSED, PipeTap
+from rail_corridor.recording.recorder import record
 from rail_msgs_py.message_definition import message_definition, type_name
 from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, READY
 
-from .frames import Attachment, attachment_frame, metadata_frame
-from .pipe_tap import CLOSED, PipeTap
-from .recorder import record
+from .processes import ProcessGroup
 
 #: The process of the launcher itself, where the report is; no other has an empty name.
 LAUNCHER: Final = ""

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rail_corridor.run.host import die_with
+from .host import die_with
 
 GRACE_S = 5.0
 _POLL_S = 0.02

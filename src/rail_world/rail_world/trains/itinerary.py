@@ -7,10 +7,10 @@ from math import inf
 from typing import Literal
 
 from rail_world.errors import WorldDataError
-from rail_world.trains.driver import nearest_ahead
+from rail_world.line.route import Route
+from rail_world.trains.description import ReversalDescription, TrainDescription
 
-from .description import ReversalDescription, TrainDescription
-from .route import Route
+from .driver import nearest_ahead
 
 # Two points closer than this are one stop.
 SAME_PLACE_M = 1.0

@@ -14,7 +14,7 @@ import pytest
 from rail_corridor.errors import InputError
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.mcap_file import RecordingFile
-from rail_corridor.recording.run_recording import RunRecording
+from rail_corridor.run.run_recording import RunRecording
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.topics.ranging import WRS_TX
 from rail_msgs_py.topics.tick import CLOCK

@@ -12,7 +12,7 @@ DOMAIN_GAIN, UNICAST_OFFSET, PARTICIPANT_GAIN = 250, 11, 2
 
 def test_discovery_stays_within_the_ports_of_one_domain() -> None:
     profile = ElementTree.fromstring(
-        (resources.files("rail_corridor.run") / "fastdds.xml").read_text()
+        (resources.files("rail_corridor.middleware") / "fastdds.xml").read_text()
     )
     ranges = [int(node.text or 0) for node in profile.iter() if "maxInitialPeersRange" in node.tag]
     assert ranges

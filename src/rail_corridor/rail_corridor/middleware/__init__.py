@@ -1,0 +1,1 @@
+"""The middleware under the corridor: domains, and who discovers whom."""

@@ -42,13 +42,6 @@ NODE_CLASSES = {
     "bus_terminal": ("rail_onboard.train_bus.terminal_node", "BusTerminalNode"),
     "train_bus_monitor": ("rail_onboard.train_bus.monitor_node", "TrainBusMonitorNode"),
 }
-#: Kinds whose name is a parameter of the scenario rather than of the class.
-_NAMED = {
-    *("wrs", "vrs", "track_code_transmitter", "track_code_receiver", "code_supervision"),
-    *("cbtc_base_station", "cbtc_radio", "atp", "reference_station"),
-    *("doppler_positioner", "localizer"),
-    *("bus_terminal", "train_bus_monitor"),
-}
 #: With more nodes than this in a process the services are left out.
 MOST_NODES_WITH_SERVICES = 12
 
@@ -62,14 +55,13 @@ def node_class(kind: str) -> Any:
 def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:
     """Create a node; equipment is switched on."""
     namespace, _, name = spec.name.rpartition("/")
-    arguments: dict[str, Any] = {
-        "namespace": namespace,
-        "context": context,
-        "parameters": spec.parameters,
-        "services": services,
-    }
-    kind = node_class(spec.kind)
-    node = kind(name, **arguments) if spec.kind in _NAMED else kind(**arguments)
+    node = node_class(spec.kind)(
+        name,
+        namespace=namespace,
+        context=context,
+        parameters=spec.parameters,
+        services=services,
+    )
     if hasattr(node, "switch_on"):
         node.switch_on()
     return node

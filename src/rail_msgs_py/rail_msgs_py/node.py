@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal
@@ -152,8 +153,8 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         return self.create_timer(period_s, self.guarded(callback), clock=self._steady)
 
     def steady_s(self) -> float:
-        """Steady wall-clock time."""
-        return float(self._steady.now().nanoseconds) * 1e-9
+        """Steady wall-clock time, that of `every`; without the objects of rclpy around it."""
+        return time.monotonic()
 
     def await_connection(self, condition: Callable[[], bool]) -> None:
         """Add a condition to those that `announce_when_connected` waits for."""

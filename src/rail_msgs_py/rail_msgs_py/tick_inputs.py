@@ -85,13 +85,14 @@ class TickInputs:
         """
         port = topic.name(**parts)
         self._inbox.open(port)
-        put, advance, begin = self._inbox.put, self._advance, self._begin_tick
+        inbox, put, advance, begin = self._inbox, self._inbox.put, self._advance, self._begin_tick
 
         def receive(raw: bytes) -> None:
             stamp_ns, item = decode(raw)
             put(stamp_ns, port, item)
             begin()
-            advance()
+            if inbox.complete:
+                advance()
 
         self._node.stream_in(topic, receive, **parts)
         return port
@@ -127,10 +128,15 @@ class TickInputs:
             Name of the port, by which the step finds its item.
         """
         port = topic.name(**parts)
-        put = self.internal_port(port, owner or topic.owner(**parts), delay_ns=delay_ns)
+        self._open(port, owner or topic.owner(**parts), delay_ns)
+        inbox, put, advance = self._inbox, self._inbox.put, self._advance
 
+        # Run for every message: whatever can be looked up before is.
         def receive(raw: bytes) -> None:
-            put(*decode(raw))
+            stamp_ns, item = decode(raw)
+            put(stamp_ns + delay_ns, port, item)
+            if inbox.complete:
+                advance()
 
         self._node.stream_in(topic, receive, **parts)
         return port
@@ -144,18 +150,20 @@ class TickInputs:
         -------
         callable of stamp [ns] and item
         """
+        self._open(port, owner, delay_ns)
+
+        def put(stamp_ns: int, item: Any) -> None:
+            self._inbox.put(stamp_ns + delay_ns, port, item)
+            self._advance()
+
+        return put
+
+    def _open(self, port: str, owner: str, delay_ns: int) -> None:
         self._inbox.open(port)
         if self._watch is not None:
             self._owners[port] = owner
         if delay_ns:
             self._inbox.put(0, port, None)
-        put_in, advance = self._inbox.put, self._advance
-
-        def put(stamp_ns: int, item: Any) -> None:
-            put_in(stamp_ns + delay_ns, port, item)
-            advance()
-
-        return put
 
     def _begin_tick(self) -> None:
         if self._watch is not None:

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
 from rail_corridor.run.plan import make_plan
@@ -147,6 +149,24 @@ def test_names_are_those_of_the_kind_unless_others_are_given(graph: Any) -> None
     assert default.get_fully_qualified_name() == "/wayside/ac1/counter"
     assert (other.get_fully_qualified_name(), other.place) == ("/wayside/ac2/c2", "ac2")
     assert Counter.parameter_type is CounterParameters
+
+
+def test_a_namespace_given_on_the_command_line_is_that_of_the_topics(ros_domain: int) -> None:
+    context = rclpy.Context()
+    rclpy.init(
+        args=["--ros-args", "-r", "__ns:=/wayside/ac7"],
+        context=context,
+        domain_id=ros_domain,
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
+    node = Counter(context=context, services=False)
+    try:
+        assert node.place == "ac7"
+        names = {name for name, _ in node.get_topic_names_and_types()}
+        assert {"/wayside/ac7/head/pulses", "/wayside/ac7/counter/count"} <= names
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
 
 
 @pytest.mark.parametrize(

@@ -19,15 +19,15 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "vrs = rail_onboard.ranging.vrs_node:main",
-            "track_code_receiver = rail_onboard.track_code.receiver_node:main",
-            "code_supervision = rail_onboard.track_code.supervision_node:main",
-            "cbtc_radio = rail_onboard.train_radio.radio_node:main",
-            "atp = rail_onboard.train_radio.atp_node:main",
-            "doppler_positioner = rail_onboard.doppler.positioner_node:main",
+            "vrs = rail_onboard.ranging.vrs_node:VrsNode.main",
+            "track_code_receiver = rail_onboard.track_code.receiver_node:TrackCodeReceiverNode.main",
+            "code_supervision = rail_onboard.track_code.supervision_node:CodeSupervisionNode.main",
+            "cbtc_radio = rail_onboard.train_radio.radio_node:CbtcRadioNode.main",
+            "atp = rail_onboard.train_radio.atp_node:AtpNode.main",
+            "doppler_positioner = rail_onboard.doppler.positioner_node:DopplerPositionerNode.main",
             "localizer = rail_onboard.localizer.localizer_node:main",
-            "bus_terminal = rail_onboard.train_bus.terminal_node:main",
-            "train_bus_monitor = rail_onboard.train_bus.monitor_node:main",
+            "bus_terminal = rail_onboard.train_bus.terminal_node:BusTerminalNode.main",
+            "train_bus_monitor = rail_onboard.train_bus.monitor_node:TrainBusMonitorNode.main",
         ],
     },
 )

@@ -19,11 +19,11 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "wrs = rail_wayside.ranging.wrs_node:main",
-            "zone_controller = rail_wayside.zone_controller_node:main",
-            "track_code_transmitter = rail_wayside.track_code.transmitter_node:main",
-            "cbtc_base_station = rail_wayside.train_radio.base_station_node:main",
-            "reference_station = rail_wayside.doppler.reference_station_node:main",
+            "wrs = rail_wayside.ranging.wrs_node:WrsNode.main",
+            "zone_controller = rail_wayside.zone_controller_node:ZoneControllerNode.main",
+            "track_code_transmitter = rail_wayside.track_code.transmitter_node:TrackCodeTransmitterNode.main",
+            "cbtc_base_station = rail_wayside.train_radio.base_station_node:CbtcBaseStationNode.main",
+            "reference_station = rail_wayside.doppler.reference_station_node:ReferenceStationNode.main",
         ],
     },
 )

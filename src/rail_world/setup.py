@@ -19,13 +19,13 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "world = rail_world.world_node:main",
-            "radio_medium = rail_world.ranging.medium_node:main",
-            "rail_medium = rail_world.track_code.medium_node:main",
-            "cbtc_medium = rail_world.train_radio.medium_node:main",
-            "backbone = rail_world.train_radio.backbone_node:main",
-            "reference_medium = rail_world.doppler.medium_node:main",
-            "bus_medium = rail_world.train_bus.medium_node:main",
+            "world = rail_world.world_node:WorldNode.main",
+            "radio_medium = rail_world.ranging.medium_node:RadioMediumNode.main",
+            "rail_medium = rail_world.track_code.medium_node:RailMediumNode.main",
+            "cbtc_medium = rail_world.train_radio.medium_node:CbtcMediumNode.main",
+            "backbone = rail_world.train_radio.backbone_node:BackboneNode.main",
+            "reference_medium = rail_world.doppler.medium_node:ReferenceMediumNode.main",
+            "bus_medium = rail_world.train_bus.medium_node:BusMediumNode.main",
         ],
     },
 )

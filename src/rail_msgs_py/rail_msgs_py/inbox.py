@@ -20,12 +20,17 @@ class TickInbox(Generic[Item]):
     (True, (0, {'a': 1.0, 'b': 2.0}))
     """
 
-    def __init__(self, ports: Iterable[str]) -> None:
+    def __init__(self, ports: Iterable[str] = ()) -> None:
         self.ports: tuple[str, ...] = tuple(sorted(ports))
         self._awaited = set(self.ports)
         self._ticks: dict[int, dict[str, Item]] = {}
         self._first: dict[str, Item] | None = None
         self._taken_ns = -1
+
+    def open(self, port: str) -> None:
+        """Wait for one more port from now on."""
+        self.ports = tuple(sorted({*self.ports, port}))
+        self._awaited.add(port)
 
     def put(self, stamp_ns: int, port: str, item: Item) -> None:
         """Add an item; one of a tick already taken only shows that its port is alive again."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from numpy.typing import NDArray
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode
@@ -19,6 +22,7 @@ from rail_msgs_py.topics.topic import Topic
 
 from .parameters import overrides
 from .stamps import to_time
+from .table import TableWriter
 from .tap import raw_publish, tapped
 
 READY_POLL_S = 0.05
@@ -48,43 +52,78 @@ def node_arguments(
     }
 
 
-class CorridorMixin:
+# To the type checker the mixin has what rclpy's nodes have; at run time it stands before them.
+_RosNode: Any = Node if TYPE_CHECKING else object
+
+
+class CorridorMixin(_RosNode):  # type: ignore[misc]
     """Streams, readiness, failures and health on top of an rclpy node."""
 
-    def init_corridor(self: Any) -> None:
+    def init_corridor(self) -> None:
         """Create what every node has; call once after the node's own constructor."""
         self._connections: list[Callable[[], bool]] = []
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
-        self._health: dict[str, tuple[int, str]] = {}
+        self._health: dict[str, tuple[bytes, str]] = {}
         self._ready_publisher: Any = None
         self._ready_timer: Any = None
 
-    def publisher(self: Any, topic: Topic, **parts: object) -> Any:
+    def publisher(self, topic: Topic, **parts: object) -> Any:
         """Publisher of a topic of the table."""
         publisher = self.create_publisher(topic.type, topic.name(**parts), topic.qos)
         return tapped(self.context, topic, publisher)
 
-    def stream_out(self: Any, topic: Topic, **parts: object) -> Callable[[bytes], None]:
+    def stream_out(self, topic: Topic, **parts: object) -> Callable[[bytes], None]:
         """Function that publishes serialised messages to a reader that the tick waits for."""
         publisher = self.publisher(topic, **parts)
         self._connections.append(lambda: publisher.get_subscription_count() > 0)
         return raw_publish(publisher)
 
-    def stream_in(
-        self: Any, topic: Topic, callback: Callable[[bytes], None], **parts: object
-    ) -> None:
+    def table_out(
+        self, topic: Topic, rows: Iterable[str], *, awaited: bool = False, **parts: object
+    ) -> Callable[[int, NDArray[np.float64]], None]:
+        """Function that publishes the values of a table.
+
+        Parameters
+        ----------
+        topic : Topic
+            Knows the columns.
+        rows : iterable of str
+            Names of the rows.
+        awaited : bool
+            Whether the tick waits for its reader, as with `stream_out`.
+        **parts
+            Of the name of the topic.
+
+        Returns
+        -------
+        callable of stamp [ns] and values [row, column]
+            The values must be C-contiguous.
+        """
+        publish = (
+            self.stream_out(topic, **parts)
+            if awaited
+            else raw_publish(self.publisher(topic, **parts))
+        )
+        write = TableWriter(tuple(rows), topic.columns).write
+
+        def send(stamp_ns: int, values: NDArray[np.float64]) -> None:
+            publish(write(stamp_ns, values))
+
+        return send
+
+    def stream_in(self, topic: Topic, callback: Callable[[bytes], None], **parts: object) -> None:
         """Subscribe to serialised messages of a topic of the table."""
         name = topic.name(**parts)
         self._subscribe(topic.type, name, callback, topic.qos, raw=True)
         self._connections.append(lambda: self.count_publishers(name) > 0)
 
-    def listen(self: Any, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
+    def listen(self, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         """Subscribe to messages of a topic that nothing waits for."""
         self._subscribe(topic.type, topic.name(**parts), callback, topic.qos, raw=False)
 
     def _subscribe(
-        self: Any,
+        self,
         kind: Any,
         name: str,
         callback: Callable[[Any], None],
@@ -94,7 +133,7 @@ class CorridorMixin:
     ) -> None:
         self.create_subscription(kind, name, self.guarded(callback), qos, raw=raw)
 
-    def guarded(self: Any, callback: Callable[..., None]) -> Callable[..., None]:
+    def guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
         """Callback whose exceptions are told on ``/diagnostics`` instead of stopping the process.
 
         The tick's timeout then treats the node as silent, as it would a broken device.
@@ -109,18 +148,22 @@ class CorridorMixin:
 
         return run
 
-    def every(self: Any, period_s: float, callback: Callable[[], None]) -> Any:
+    def every(self, period_s: float, callback: Callable[[], None]) -> Any:
         """Timer on the steady wall clock."""
         return self.create_timer(period_s, self.guarded(callback), clock=self._steady)
 
-    def steady_s(self: Any) -> float:
-        """Steady wall-clock time."""
-        return float(self._steady.now().nanoseconds) * 1e-9
+    def steady_s(self) -> float:
+        """Steady wall-clock time, that of `every`; without the objects of rclpy around it."""
+        return time.monotonic()
 
-    def announce_when_connected(self: Any, condition: Callable[[], bool] | None = None) -> None:
+    def await_connection(self, condition: Callable[[], bool]) -> None:
+        """Add a condition to those that `announce_when_connected` waits for."""
+        self._connections.append(condition)
+
+    def announce_when_connected(self, condition: Callable[[], bool] | None = None) -> None:
         """Publish the node's name on ``/ready`` once all its streams have a counterpart."""
         if condition is not None:
-            self._connections.append(condition)
+            self.await_connection(condition)
         self._ready_publisher = self.publisher(READY)
 
         def poll() -> None:
@@ -133,7 +176,7 @@ class CorridorMixin:
         self._ready_timer = self.every(READY_POLL_S, poll)
 
     def report(
-        self: Any,
+        self,
         level: bytes,
         what: str,
         message: str,

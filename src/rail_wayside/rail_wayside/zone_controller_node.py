@@ -19,21 +19,17 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py.failures import TickWatch
+from rail_msgs_py.decoders import stamped
 from rail_msgs_py.headers import header_to_cdr
-from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.node import CorridorNode
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.ranging.range_reading import range_from_cdr
-from rail_msgs_py.stamps import clock_from_cdr
-from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
+from rail_msgs_py.tick_node import TickNode
 from rail_msgs_py.topics.ranging import POSITION, RANGE
-from rail_msgs_py.topics.tick import CLOCK, DONE
+from rail_msgs_py.topics.tick import DONE
 from rail_msgs_py.topics.train_radio import (
     AUTHORITY,
-    BACKBONE,
     BACKBONE_UP,
     DOWN_TELEGRAMS,
     REPORTS,
@@ -45,7 +41,6 @@ from rail_wayside.ranging.zone_map import Zone, ZoneMap
 from rail_wayside.train_radio.authority_issuer import Taken
 from rail_wayside.train_radio.parameters import AuthorityParameters, desk_of
 
-_CLOCK_PORT = "clock"
 _fields = attrgetter(*REPORTS.columns[1:])
 
 
@@ -104,117 +99,70 @@ def zone_map_of(p: ZoneControllerParameters) -> ZoneMap:
     return ZoneMap(zones, following)
 
 
-class ZoneControllerNode(CorridorNode):
+class ZoneControllerNode(
+    TickNode[ZoneControllerParameters], name="zone_controller", namespace="/wayside"
+):
     """The zone controller as a node."""
 
-    def __init__(
-        self,
-        *,
-        namespace: str = "/wayside",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(
-            "zone_controller", namespace, context=context, parameters=parameters, services=services
-        )
-        self._p = declare(self, ZoneControllerParameters)
-        zone_map = zone_map_of(self._p)
-        trains = list(zip(self._p.trains, self._p.entry_zones, strict=True))
-        self._tracker = ZoneTracker(zone_map, trains)
-        self._positions = {
-            name: self.publisher(POSITION, train=name).publish for name in self._p.trains
-        }
+    def setup(self) -> None:
+        """Open the ports of all stations and base stations."""
+        p = self._p
+        zone_map = zone_map_of(p)
+        self._tracker = ZoneTracker(zone_map, list(zip(p.trains, p.entry_zones, strict=True)))
+        self._positions = {name: self.publisher(POSITION, train=name).publish for name in p.trains}
         self._writers: dict[tuple[str, str], PositionWriter] = {}
-        owners = {zone.name: f"/wayside/{zone.site}" for zone in zone_map.zones.values()}
-        owners |= self._open_desk()
+        # In the order of their names, so that sums over them are repeatable.
+        self._zone_ports = {
+            name: self.inputs.port(RANGE, _reading, site=zone.site, zone=name)
+            for name, zone in sorted(zone_map.zones.items())
+        }
+        self._open_desk()
         # The clock is a port like the others: a tick ends though no station answers.
-        self._inbox: TickInbox[Any] = TickInbox([*owners, _CLOCK_PORT])
-        self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
-        for zone in zone_map.zones.values():
-            self.stream_in(
-                RANGE,
-                lambda raw, zone=zone.name: self._on_range(zone, raw),
-                site=zone.site,
-                zone=zone.name,
-            )
-        self.stream_in(CLOCK, self._on_clock)
+        self.inputs.clock()
         self._done = self.stream_out(DONE, node=self.get_fully_qualified_name())
-        self.announce_when_connected()
 
-    def _open_desk(self) -> dict[str, str]:
-        """Begin to speak with trains; ports of the base stations and who sends there."""
+    def _open_desk(self) -> None:
+        """Begin to speak with trains."""
         p = self._p
         self._desk = desk_of(p)
         self._segments = {name: number for number, name in enumerate(p.segments)}
         # Without a desk there are no numbers.
         self._numbers = dict(zip(p.trains, p.train_numbers, strict=False))
-        self._told = {
-            train: self.publisher(AUTHORITY, train=train).publish
-            for train in (p.trains if self._desk else ())
+        trains = p.trains if self._desk else ()
+        self._authorities = {
+            train: self.table_out(AUTHORITY, (train,), train=train) for train in trains
         }
-        self._told_tables = {
-            train: TableWriter((train,), AUTHORITY.columns) for train in self._told
-        }
-        self._taken = {train: self.publisher(REPORTS, train=train).publish for train in self._told}
+        self._reports = {train: self.publisher(REPORTS, train=train).publish for train in trains}
         self._down = {base: self.stream_out(DOWN_TELEGRAMS, base=base) for base in p.bases}
-        heard = BACKBONE_UP if p.backbone else UP_TELEGRAMS
-        for base in p.bases:
-            self.stream_in(heard, lambda raw, base=base: self._on_telegrams(base, raw), base=base)
-        return {
-            _port(base): BACKBONE if p.backbone else UP_TELEGRAMS.owner(base=base)
+        topic = BACKBONE_UP if p.backbone else UP_TELEGRAMS
+        self._base_ports = {
+            base: self.inputs.port(topic, stamped(Telegrams.from_cdr), base=base)
             for base in p.bases
         }
 
-    def _on_telegrams(self, base: str, raw: bytes) -> None:
-        heard = Telegrams.from_cdr(raw)
-        self._inbox.put(heard.stamp_ns, _port(base), heard)
-        self._advance()
-
-    def _on_clock(self, raw: bytes) -> None:
-        self._inbox.put(clock_from_cdr(raw), _CLOCK_PORT, None)
-        self._watch.begin()
-        self._advance()
-
-    def _on_range(self, zone: str, raw: bytes) -> None:
-        stamp_ns, range_m, variance_m2 = range_from_cdr(raw)
-        heard = range_m != math.inf
-        self._inbox.put(stamp_ns, zone, Reading(range_m, variance_m2) if heard else NOT_HEARD)
-        self._advance()
-
-    def _advance(self) -> None:
-        while self._inbox.complete:
-            self._tick_over()
-
-    def _tick_over(self) -> None:
-        stamp_ns, readings = self._inbox.take()
-        self._watch.end()
-        fixes = self._tracker.update(
-            stamp_ns * 1e-9,
-            {zone: reading for zone, reading in readings.items() if isinstance(reading, Reading)},
-        )
+    def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        """Locate the trains, and give them authorities."""
+        readings = {zone: items[port] for zone, port in self._zone_ports.items() if port in items}
+        fixes = self._tracker.update(stamp_ns * 1e-9, readings)
         for fix in fixes:
             self._publish(stamp_ns, fix)
-        self._authorise(stamp_ns, fixes, readings)
+        self._authorise(stamp_ns, fixes, items)
         self._report_zones(stamp_ns)
         self._done(header_to_cdr(stamp_ns))
 
-    def _authorise(
-        self, stamp_ns: int, fixes: Iterable[Fix], heard: Mapping[str, Telegrams | Reading | None]
-    ) -> None:
+    def _authorise(self, stamp_ns: int, fixes: Iterable[Fix], items: Mapping[str, Any]) -> None:
         """Take the trains' reports of a tick, and give authorities for the next one."""
-        desk, p = self._desk, self._p
+        desk = self._desk
         if desk is None:
             return
         taken: dict[int, list[Taken]] = {}
-        for base in p.bases:
-            batch = heard.get(_port(base))
-            for slot, frame in batch.frames if isinstance(batch, Telegrams) else ():
+        for base, port in self._base_ports.items():
+            for slot, frame in items[port].frames if port in items else ():
                 if (report := desk.receive(base, slot, frame, stamp_ns)) is not None:
                     taken.setdefault(slot, []).append(report)
         numbers = self._numbers
-        for train, tell in self._taken.items():
-            tell(_reports(stamp_ns, taken.get(numbers[train], ())))
+        for train, publish_reports in self._reports.items():
+            publish_reports(_reports(stamp_ns, taken.get(numbers[train], ())))
         for fix in fixes:
             segment = self._segments.get(fix.track)
             if segment is not None:
@@ -222,9 +170,9 @@ class ZoneControllerNode(CorridorNode):
                 desk.ranged(numbers[fix.train], stamp_ns * 1e-9, *place)
         for base, frames in desk.telegrams(stamp_ns).items():
             self._down[base](telegrams(stamp_ns, frames))
-        for train, publish in self._told.items():
+        for train, publish in self._authorities.items():
             figures = np.array([desk.given(numbers[train], stamp_ns)], dtype=np.float64)
-            publish(self._told_tables[train].write(stamp_ns, figures))
+            publish(stamp_ns, figures)
             trouble = desk.troubles(numbers[train])
             self.report(
                 DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK,
@@ -273,15 +221,10 @@ def _reports(stamp_ns: int, taken: Sequence[Taken]) -> bytes:
     return _reports_table(len(taken)).write(stamp_ns, values)
 
 
-def _port(base: str) -> str:
-    """Port of what a base station has received; zones are ports too."""
-    return f"{base}/telegrams"
-
-
-def main() -> None:
-    """Run the zone controller on its own."""
-    run_node(ZoneControllerNode)
+def _reading(raw: bytes) -> tuple[int, Reading]:
+    stamp_ns, range_m, variance_m2 = range_from_cdr(raw)
+    return stamp_ns, NOT_HEARD if range_m == math.inf else Reading(range_m, variance_m2)
 
 
 if __name__ == "__main__":
-    main()
+    ZoneControllerNode.main()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -16,14 +17,14 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Header, String
 
-from rail_msgs_py.failures import FailureWatch
+from rail_msgs_py.failures import WATCH_PERIOD_S, FailureWatch
 from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.node import CorridorNode
-from rail_msgs_py.parameters import declare, parameter
+from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
-from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import TableWriter, figures_from_cdr
+from rail_msgs_py.table import figures_from_cdr
+from rail_msgs_py.tap import raw_publish
+from rail_msgs_py.tick_node import TickNode
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.topics.tick import CLOCK, DONE, FAILED, FINISHED, OBSERVED, READY
 from rail_msgs_py.topics.world import (
@@ -42,7 +43,6 @@ from rail_world.trains.wheels import Wheels, wheel_errors
 
 from .world_file import read_world_file
 
-WATCH_PERIOD_S = 0.1
 _NOT_RECEIVED = DriveCommand(emergency_brake=True)
 
 
@@ -76,21 +76,11 @@ class WorldParameters:
     )
 
 
-class WorldNode(CorridorNode):
+class WorldNode(TickNode[WorldParameters], name="world"):
     """The world as a node."""
 
-    def __init__(
-        self,
-        *,
-        namespace: str = "",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(
-            "world", namespace, context=context, parameters=parameters, services=services
-        )
-        self._p = declare(self, WorldParameters)
+    def setup(self) -> None:
+        """Make the trains, and open the ports of all that ends a tick."""
         described = read_world_file(self._p.world_file)
         network = described.network()
         self._tick_ns = described.tick_ns
@@ -103,9 +93,8 @@ class WorldNode(CorridorNode):
         self._finished = False
         names = self._traffic.names
         self._clock_publisher = self.publisher(CLOCK)
-        self._clock = self._clock_publisher.publish
-        self._state = self.publisher(STATE).publish
-        self._state_table = TableWriter(names, STATE.columns)
+        self._begin_tick = raw_publish(self._clock_publisher)
+        self._state = self.table_out(STATE, names)
         self._truth = [self.publisher(TRUTH, train=name).publish for name in names]
         self._truth_writers: dict[tuple[str, str], PositionWriter] = {}
         self._finish = self.publisher(FINISHED)
@@ -114,15 +103,13 @@ class WorldNode(CorridorNode):
             for train in self._p.supervised
         }
         self._odometers = {
-            train: self.stream_out(ODOMETER, train=train) for train in self._p.odometers
+            train: self.table_out(ODOMETER, (train,), awaited=True, train=train)
+            for train in self._p.odometers
         }
         errors = wheel_errors(described.seed, described.odometer_error, self._p.odometers)
         self._wheels = {
             train: Wheels(error, [slip for slip in described.slips if slip.train == train])
             for train, error in errors.items()
-        }
-        self._odometer_tables = {
-            train: TableWriter((train,), ODOMETER.columns) for train in self._p.odometers
         }
         # Until its first command a train stands: what is not received is not permitted.
         self._commands = dict.fromkeys(self._p.supervised, _NOT_RECEIVED)
@@ -132,30 +119,23 @@ class WorldNode(CorridorNode):
         for train, port in self._supervisors.items():
             self.stream_in(
                 COMMAND,
-                lambda raw, port=port: self._on_command(raw, port),
+                partial(self._on_command, port),
                 train=train,
                 supervision=self._p.supervision,
             )
         for sink in self._p.sinks:
-            self.stream_in(DONE, lambda raw, sink=sink: self._done(raw, sink), node=sink)
+            self.stream_in(DONE, partial(self._on_done, sink), node=sink)
         if self._p.observed:
             self.listen(OBSERVED, self._on_observed)
         self.listen(READY, self._on_ready)
         self.listen(FAILED, self._on_failed_before_start)
-        self._latched = []
         for name, track in network.tracks.items():
-            publisher = self.publisher(CORRIDOR_PATH, track=name)
-            publisher.publish(path_of(track))
-            self._latched.append(publisher)
-        publisher = self.publisher(CORRIDOR_MARKERS)
-        publisher.publish(markers(described.drawing, network))
-        self._latched.append(publisher)
-        publisher = self.publisher(SCENARIO)
-        publisher.publish(String(data=described.scenario))
-        self._latched.append(publisher)
+            self.publisher(CORRIDOR_PATH, track=name).publish(path_of(track))
+        self.publisher(CORRIDOR_MARKERS).publish(markers(described.drawing, network))
+        self.publisher(SCENARIO).publish(String(data=described.scenario))
         self._pace: Any = None
         self._watch_timer = self.every(WATCH_PERIOD_S, self._check)
-        self.announce_when_connected(
+        self.await_connection(
             lambda: self._clock_publisher.get_subscription_count() >= self._p.clock_readers
         )
 
@@ -189,11 +169,11 @@ class WorldNode(CorridorNode):
         stamp_ns = self._tick * self._tick_ns
         self._begun_s = self.steady_s()
         state = self._traffic.state()
-        self._state(self._state_table.write(stamp_ns, state))
+        self._state(stamp_ns, state)
         if stamp_ns % NANOSECONDS < self._tick_ns:
             self._publish_truth(stamp_ns)
         self._publish_odometers(stamp_ns)
-        self._clock(clock_to_cdr(stamp_ns))
+        self._begin_tick(clock_to_cdr(stamp_ns))
         if not self._inbox.ports:
             self._tick_over()
 
@@ -212,7 +192,7 @@ class WorldNode(CorridorNode):
         travelled = self._traffic.travelled()
         for train, publish in self._odometers.items():
             figures = np.array([self._wheels[train].count(1e-9 * stamp_ns, *travelled[train])])
-            publish(self._odometer_tables[train].write(stamp_ns, figures))
+            publish(stamp_ns, figures)
 
     def _publish_truth(self, stamp_ns: int) -> None:
         for publish, (name, track, chainage_m, speed_mps) in zip(
@@ -224,11 +204,11 @@ class WorldNode(CorridorNode):
             position = Position(stamp_ns, name, track, chainage_m, 0.0, speed_mps, 0.0)
             publish(self._truth_writers[key].write(position))
 
-    def _done(self, raw: bytes, sink: str) -> None:
+    def _on_done(self, sink: str, raw: bytes) -> None:
         self._inbox.put(clock_from_cdr(raw), sink, None)
         self._advance()
 
-    def _on_command(self, raw: bytes, port: str) -> None:
+    def _on_command(self, port: str, raw: bytes) -> None:
         stamp_ns, figures = figures_from_cdr(raw, 1, len(COMMAND.columns))
         permitted_mps, _, service_brake, emergency_brake = figures[0].tolist()
         command = DriveCommand(
@@ -322,10 +302,5 @@ class WorldNode(CorridorNode):
             self._tick_over()
 
 
-def main() -> None:
-    """Run the world on its own."""
-    run_node(WorldNode)
-
-
 if __name__ == "__main__":
-    main()
+    WorldNode.main()

@@ -54,9 +54,7 @@ def tables() -> str:
 
 def parameters_of(kind: str) -> Any:
     """Parameters of a kind of node."""
-    node = node_kinds()[kind].load()
-    name = node.__name__.removesuffix("Node")
-    return getattr(sys.modules[node.__module__], f"{name}Parameters")
+    return node_kinds()[kind].load().parameter_type
 
 
 def ends_of(topic: Topic) -> tuple[str, str]:

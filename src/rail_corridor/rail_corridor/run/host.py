@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import inspect
 import os
 import signal
 import threading
@@ -23,15 +22,13 @@ MOST_NODES_WITH_SERVICES = 12
 def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:
     """Create a node; equipment is switched on."""
     namespace, _, name = spec.name.rpartition("/")
-    arguments: dict[str, Any] = {
-        "namespace": namespace,
-        "context": context,
-        "parameters": spec.parameters,
-        "services": services,
-    }
-    kind = node_kinds()[spec.kind].load()
-    named = "name" in inspect.signature(kind).parameters
-    node = kind(name, **arguments) if named else kind(**arguments)
+    node = node_kinds()[spec.kind].load()(
+        name,
+        namespace=namespace,
+        context=context,
+        parameters=spec.parameters,
+        services=services,
+    )
     if hasattr(node, "switch_on"):
         node.switch_on()
     return node

@@ -35,6 +35,7 @@ WRS_TX: Final = Topic(
     "wrs",
     "radio_medium",
     "What the antenna into the zone sends: the FM-carried tone on the zone's downlink channel.",
+    below_owner=2,
 )
 WRS_RX: Final = Topic(
     "/wayside/{site}/{zone}/rx",
@@ -53,6 +54,7 @@ RANGE: Final = Topic(
     "wrs",
     "zone_controller",
     "Range to the train in the zone with its variance; inf = nothing heard, nan = unusable.",
+    below_owner=2,
 )
 VRS_RX: Final = Topic(
     "/{train}/vrs/channel_{channel}/rx",

@@ -26,6 +26,8 @@ class Topic:
         For the documentation.
     columns : tuple of str
         Of a table: names of its columns, each ending in its unit.
+    below_owner : int
+        Levels of its name below that of the node that sends it.
     """
 
     pattern: str
@@ -36,6 +38,7 @@ class Topic:
     readers: str
     text: str
     columns: tuple[str, ...] = ()
+    below_owner: int = 1
 
     @cached_property
     def index(self) -> dict[str, int]:
@@ -63,7 +66,7 @@ class Topic:
         >>> OCCUPANCY.owner(circuit="tc1")
         '/wayside/tc1/track_code'
         """
-        return self.name(**parts).rpartition("/")[0]
+        return self.name(**parts).rsplit("/", self.below_owner)[0]
 
     def matches(self, name: str) -> bool:
         """Whether ``name`` is of this kind."""

@@ -58,6 +58,7 @@ DOWN_TELEGRAMS: Final = Topic(
     "zone_controller",
     "cbtc_base_station or backbone",
     "Frames for the trains of a base station, sent in the next tick.",
+    below_owner=2,
 )
 UP_TELEGRAMS: Final = Topic(
     "/wayside/{base}/cbtc/telegrams",
@@ -77,6 +78,7 @@ BACKBONE_DOWN: Final = Topic(
     "cbtc_base_station",
     "What the network makes of the frames for the trains of a base station; it sends them in the "
     "next tick.",
+    below_owner=2,
 )
 BACKBONE_UP: Final = Topic(
     "/world/backbone/{base}/uplink_telegrams",
@@ -86,6 +88,7 @@ BACKBONE_UP: Final = Topic(
     "backbone",
     "zone_controller",
     "What the network makes of the frames that the base station has received in the tick.",
+    below_owner=2,
 )
 STRIKES: Final = Topic(
     "/world/backbone/strikes",
@@ -167,6 +170,7 @@ REPORTS: Final = Topic(
         *("sealed_s", "train", "segment", "offset_m", "direction", "speed_mps", "uncertainty_m"),
         *("length_m", "integrity_confirmed", "position_valid"),
     ),
+    below_owner=2,
 )
 AUTHORITY: Final = Topic(
     "/wayside/zone_controller/{train}/authority",
@@ -181,6 +185,7 @@ AUTHORITY: Final = Topic(
         *("end_of_authority_m", "limit_mps", "worst_rear_m", "report_age_s"),
         *("accepted", "lost", "rejected"),
     ),
+    below_owner=2,
 )
 
 #: In the order of the documentation.

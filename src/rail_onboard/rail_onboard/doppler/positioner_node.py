@@ -5,21 +5,17 @@ Topics in: ``rx``. Topics out: ``fix``, ``position``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.stamps import NANOSECONDS
-from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import TableWriter
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import DOPPLER_FIX, DOPPLER_POSITION, REFERENCE_RX
 from rail_msgs_py.waveform import Waveform, silent_stamp_ns
 from rail_signals.doppler.receiver import ToneReceiver
@@ -65,65 +61,46 @@ def positioner_of(p: DopplerPositionerParameters) -> DopplerPositioner:
 
     Raises
     ------
-    ParameterError
+    ValueError
         If they do not fit together.
     """
     plan = tone_plan_of(p)
-    try:
-        line = SurveyedLine(
-            np.array(p.line_chainage_m),
-            np.array(p.line_x_m),
-            np.array(p.line_y_m),
-            np.array(p.line_z_m),
-            np.array(p.line_heading_rad),
-        )
-        places = np.column_stack([p.station_x_m, p.station_y_m, p.station_z_m])
-        solver = DopplerSolver(
-            plan,
-            line,
-            places,
-            p.station_slots,
-            worst_sigma_m=p.worst_sigma_m,
-            grid_m=min(5.0, 0.25 * p.min_distance_m),
-        )
-    except ValueError as error:
-        raise ParameterError(f"doppler_positioner: {error}") from None
+    line = SurveyedLine(
+        np.array(p.line_chainage_m),
+        np.array(p.line_x_m),
+        np.array(p.line_y_m),
+        np.array(p.line_z_m),
+        np.array(p.line_heading_rad),
+    )
+    solver = DopplerSolver(
+        plan,
+        line,
+        np.column_stack([p.station_x_m, p.station_y_m, p.station_z_m]),
+        p.station_slots,
+        worst_sigma_m=p.worst_sigma_m,
+        grid_m=min(5.0, 0.25 * p.min_distance_m),
+    )
     tracking = Tracking(p.max_speed_mps, p.placed_m, p.walk_hz, p.station_hz)
     return DopplerPositioner(ToneReceiver(plan), solver, tracking, p.start_m, p.direction)
 
 
-class DopplerPositionerNode(Equipment):
+class DopplerPositionerNode(
+    EquipmentNode[DopplerPositionerParameters], name="doppler", namespace="/train_1"
+):
     """A positioner as a managed node; switched off it knows nothing."""
 
-    def __init__(
-        self,
-        name: str = "doppler",
-        *,
-        namespace: str = "/train_1",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        self._p = p = declare(self, DopplerPositionerParameters)
-        self._train = train = namespace.strip("/")
-        self._positioner = positioner_of(p)
-        self._last_ns: int | None = None
-        self._fix = (
-            self.stream_out(DOPPLER_FIX, train=train)
-            if p.localizer
-            else self.publisher(DOPPLER_FIX, train=train).publish
-        )
-        self._table = TableWriter((train,), DOPPLER_FIX.columns)
+    def setup(self) -> None:
+        """Open the ports of the train."""
+        p, train = self._p, self.place
+        self._fix = self.table_out(DOPPLER_FIX, (train,), awaited=p.localizer, train=train)
         self._position = self.publisher(DOPPLER_POSITION, train=train).publish
         self._writer = PositionWriter(train, p.track)
         self.stream_in(REFERENCE_RX, self._on_block, train=train)
-        self.announce_when_connected()
 
-    def on_activate(self, state: Any) -> Any:
-        """Switched on again, it knows nothing of what was before."""
-        self._positioner, self._last_ns = positioner_of(self._p), None
-        return super().on_activate(state)
+    def start_over(self) -> None:
+        """Be where the train is put into service."""
+        self._positioner = positioner_of(self._p)
+        self._last_ns: int | None = None
 
     def _on_block(self, raw: bytes) -> None:
         silent_ns = silent_stamp_ns(raw)
@@ -141,7 +118,7 @@ class DopplerPositionerNode(Equipment):
     def _publish(self, stamp_ns: int, answer: Answer, tones: int) -> None:
         fix = answer.fix if answer.reason is Reason.NONE else None
         place = Position(
-            stamp_ns, self._train, self._p.track, self._positioner.near_m, inf, 0.0, inf
+            stamp_ns, self.place, self._p.track, self._positioner.near_m, inf, 0.0, inf
         )
         figures = [float(answer.reason), *(np.nan,) * 5, float(tones), np.nan]
         if fix is not None:
@@ -150,24 +127,19 @@ class DopplerPositionerNode(Equipment):
             figures[7] = fix.offset_hz
             place = Position(
                 stamp_ns,
-                self._train,
+                self.place,
                 self._p.track,
                 fix.chainage_m,
                 float(c[0, 0]),
                 fix.speed_mps,
                 float(c[1, 1]),
             )
-        self._fix(self._table.write(stamp_ns, np.array([figures])))
+        self._fix(stamp_ns, np.array([figures]))
         self._position(self._writer.write(place))
         trouble = "" if fix is not None else answer.reason.name.lower().replace("_", " ")
         level = DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK
         self.report(level, "position", trouble or "position known", stamp_ns=stamp_ns)
 
 
-def main() -> None:
-    """Run the positioner of a train on its own."""
-    run_node(DopplerPositionerNode)
-
-
 if __name__ == "__main__":
-    main()
+    DopplerPositionerNode.main()

@@ -12,16 +12,14 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
-from numpy.typing import NDArray
 
-from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.decoders import samples
+from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.ranging.signal_parameters import SignalParameters, signal_of
-from rail_msgs_py.standalone import run_node
 from rail_msgs_py.table import TableWriter
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.ranging import VRS_CHANNEL, VRS_RX, VRS_TX
-from rail_msgs_py.waveform import Waveform, silence, silent_stamp_ns
+from rail_msgs_py.waveform import Waveform, silence
 from rail_signals.ranging.receiver import LineReceiver, ToneEstimate
 from rail_signals.ranging.signal import modulate
 from rail_signals.ranging.transponder import reply_lag_rad
@@ -51,66 +49,47 @@ class VrsParameters(SignalParameters):
     )
 
 
-class VrsNode(Equipment):
+class VrsNode(EquipmentNode[VrsParameters], name="vrs", namespace="/train_1"):
     """Vehicle station as a managed node."""
 
-    def __init__(
-        self,
-        name: str = "vrs",
-        *,
-        namespace: str = "/train_1",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        self._p = declare(self, VrsParameters)
-        channels = self._p.downlink_channels
-        if not len(channels) == len(self._p.uplink_channels) == len(self._p.uplink_carriers_hz):
+    def setup(self) -> None:
+        """Open the ports of all channels."""
+        p, train = self._p, self.place
+        channels = p.downlink_channels
+        if not len(channels) == len(p.uplink_channels) == len(p.uplink_carriers_hz):
             raise ParameterError(
-                f"{self.get_name()}: uplink_channels: {self._p.uplink_channels}: every downlink "
-                "channel needs one uplink channel and its carrier"
+                f"uplink_channels: {p.uplink_channels}: every downlink channel needs one uplink "
+                "channel and its carrier"
             )
-        self._signal = signal_of(self._p)
+        self._signal = signal_of(p)
         self._receiver = LineReceiver(self._signal)
-        self._check = DownlinkCheck(10.0 ** (self._p.noise_dbm / 10.0), self._signal.samples)
-        self._selector = ChannelSelector(dict(zip(channels, self._p.uplink_channels, strict=True)))
-        self._carriers_hz = dict(
-            zip(self._p.uplink_channels, self._p.uplink_carriers_hz, strict=True)
-        )
-        self._amplitude = 10.0 ** (self._p.power_dbm / 20.0)
-        self._delay_s = self._p.transponder_delay_s + self._p.delay_trim_s
-        train = namespace.strip("/")
-        self._inbox: TickInbox[NDArray[np.complex128] | None] = TickInbox(
-            str(channel) for channel in channels
-        )
-        for channel in channels:
-            self.stream_in(
-                VRS_RX,
-                lambda raw, channel=channel: self._receive(channel, raw),
-                train=train,
-                channel=channel,
-            )
+        self._check = DownlinkCheck(10.0 ** (p.noise_dbm / 10.0), self._signal.samples)
+        self._carriers_hz = dict(zip(p.uplink_channels, p.uplink_carriers_hz, strict=True))
+        self._amplitude = 10.0 ** (p.power_dbm / 20.0)
+        self._delay_s = p.transponder_delay_s + p.delay_trim_s
+        self._ports = {
+            channel: self.inputs.port(VRS_RX, samples, train=train, channel=channel)
+            for channel in sorted(channels)
+        }
         self._send = self.stream_out(VRS_TX, train=train)
         self._channel = self.publisher(VRS_CHANNEL, train=train).publish
         columns = ("downlink", "uplink", *(f"level_{channel}_dbm" for channel in channels))
         self._channel_table = TableWriter((train,), columns)
         self._figures = np.zeros((1, len(columns)))
-        self.announce_when_connected()
 
-    def _receive(self, channel: int, raw: bytes) -> None:
-        stamp_ns = silent_stamp_ns(raw)
-        if stamp_ns is not None:
-            self._inbox.put(stamp_ns, str(channel), None)
-        else:
-            block = Waveform.from_cdr(raw)
-            self._inbox.put(block.stamp_ns, str(channel), block.samples[0])
-        if self._inbox.complete:
-            stamp_ns, bursts = self._inbox.take()
-            heard = {int(port): burst for port, burst in bursts.items() if burst is not None}
-            self._answer(stamp_ns, dict(sorted(heard.items())))
+    def start_over(self) -> None:
+        """Have no channel in force."""
+        p = self._p
+        pairs = zip(p.downlink_channels, p.uplink_channels, strict=True)
+        self._selector = ChannelSelector(dict(pairs))
 
-    def _answer(self, stamp_ns: int, bursts: dict[int, NDArray[np.complex128]]) -> None:
+    def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        """Answer on the channel in force."""
+        bursts = {
+            channel: items[port][0]
+            for channel, port in self._ports.items()
+            if items[port] is not None
+        }
         levels: dict[int, float] = {}
         rows = {channel: row for row, channel in enumerate(bursts)}
         estimates: ToneEstimate | None = None
@@ -124,17 +103,17 @@ class VrsNode(Equipment):
             }
         downlink = self._selector.update(levels)
         disturbance = "cannot read the tone" if bursts else "hears no station"
-        if estimates is not None and downlink in levels:
+        reply = None
+        if estimates is not None and downlink is not None and downlink in levels:
             row = rows[downlink]
             disturbance = self._check.disturbance(
                 amplitude=float(estimates.amplitude[row]),
                 snr=float(estimates.snr[row]),
                 misfit=float(estimates.misfit[row]),
             )
-        if estimates is None or disturbance:
-            self._send(self._silence(stamp_ns))
-        else:
-            self._send(self._reply(stamp_ns, estimates, rows[downlink]))
+            if not disturbance:
+                reply = self._reply(stamp_ns, estimates, row)
+        self._send(self._silence(stamp_ns) if reply is None else reply)
         self._publish_channel(stamp_ns, levels)
         self._report(stamp_ns, disturbance)
 
@@ -142,9 +121,9 @@ class VrsNode(Equipment):
         uplink = self._selector.uplink
         assert uplink is not None
         lag_rad = reply_lag_rad(estimates.phase_lag_rad[row], self._signal, self._delay_s)
-        samples = modulate(self._signal, lag_rad) * self._amplitude
+        burst = modulate(self._signal, lag_rad) * self._amplitude
         radio = (self._signal.sample_rate_hz, self._carriers_hz[uplink], uplink)
-        return Waveform(stamp_ns, *radio, samples[None, :]).to_cdr()
+        return Waveform(stamp_ns, *radio, burst[None, :]).to_cdr()
 
     def _silence(self, stamp_ns: int) -> bytes:
         uplink = self._selector.uplink or self._p.uplink_channels[0]
@@ -167,10 +146,5 @@ class VrsNode(Equipment):
         self.report(DiagnosticStatus.WARN, "ranging", message, stamp_ns=stamp_ns)
 
 
-def main() -> None:
-    """Run a vehicle station on its own."""
-    run_node(VrsNode)
-
-
 if __name__ == "__main__":
-    main()
+    VrsNode.main()

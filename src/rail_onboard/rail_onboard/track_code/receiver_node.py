@@ -5,17 +5,14 @@ Topics in: ``rx``. Topics out: ``message``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import ParameterError, declare, parameter
-from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import TableWriter
+from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_RX
 from rail_msgs_py.waveform import Waveform
 from rail_signals.track_code.profile import load_profile, profile_names
@@ -43,37 +40,29 @@ class TrackCodeReceiverParameters:
     )
 
 
-class TrackCodeReceiverNode(Equipment):
+class TrackCodeReceiverNode(
+    EquipmentNode[TrackCodeReceiverParameters], name="track_code", namespace="/train_1"
+):
     """Receiver of track codes as a managed node."""
 
-    def __init__(
-        self,
-        name: str = "track_code",
-        *,
-        namespace: str = "/train_1",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        self._p = declare(self, TrackCodeReceiverParameters)
-        if self._p.profile not in profile_names():
-            raise ParameterError(
-                f"{name}: profile: {self._p.profile}: is none of {', '.join(profile_names())}"
-            )
-        self._profile = load_profile(self._p.profile)
-        rate_hz = self._p.sample_rate_hz
-        self._receivers = {
-            carrier_hz: FastTrackCodeReceiver(self._profile, carrier_hz, rate_hz)
-            for carrier_hz in self._p.carriers_hz
-        }
-        self._selector = CarrierSelector(self._p.carriers_hz, rate_hz, self._p.least_level_db)
-        train = namespace.strip("/")
-        self._publish = self.publisher(CODE_RECEIVED, train=train).publish
-        self._table = TableWriter((train,), CODE_RECEIVED.columns)
+    def setup(self) -> None:
+        """Open the ports of the train."""
+        name, train = self._p.profile, self.place
+        if name not in profile_names():
+            raise ParameterError(f"profile: {name}: is none of {', '.join(profile_names())}")
+        self._profile = load_profile(name)
+        self._publish = self.table_out(CODE_RECEIVED, (train,), train=train)
         self._figures = np.zeros((1, len(CODE_RECEIVED.columns)))
         self.stream_in(CODE_RX, self._on_block, train=train)
-        self.announce_when_connected()
+
+    def start_over(self) -> None:
+        """Have received nothing on any carrier."""
+        p = self._p
+        self._receivers = {
+            carrier_hz: FastTrackCodeReceiver(self._profile, carrier_hz, p.sample_rate_hz)
+            for carrier_hz in p.carriers_hz
+        }
+        self._selector = CarrierSelector(p.carriers_hz, p.sample_rate_hz, p.least_level_db)
 
     def _on_block(self, raw: bytes) -> None:
         block = Waveform.from_cdr(raw)
@@ -89,12 +78,12 @@ class TrackCodeReceiverNode(Equipment):
             if carrier_hz is not None:
                 figures[0] = carrier_hz
                 self._show(decisions[carrier_hz], figures)
-        self._publish(self._table.write(block.stamp_ns, self._figures))
-        heard = bool(figures[0])
+        self._publish(block.stamp_ns, self._figures)
+        received = bool(figures[0])
         self.report(
-            DiagnosticStatus.OK if heard else DiagnosticStatus.WARN,
+            DiagnosticStatus.OK if received else DiagnosticStatus.WARN,
             "pick-up",
-            "hears a carrier" if heard else "hears no carrier",
+            "hears a carrier" if received else "hears no carrier",
             stamp_ns=block.stamp_ns,
         )
 
@@ -108,10 +97,5 @@ class TrackCodeReceiverNode(Equipment):
         figures[3:7] = [last.fields[field] for field in _FIELDS]
 
 
-def main() -> None:
-    """Run a receiver of track codes on its own."""
-    run_node(TrackCodeReceiverNode)
-
-
 if __name__ == "__main__":
-    main()
+    TrackCodeReceiverNode.main()

@@ -6,19 +6,15 @@ Topics in: ``track_code/message``, ``odometer``, with a localizer its ``state``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py.failures import TickWatch
-from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import declare, parameter
-from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import TableWriter, figures_from_cdr
+from rail_msgs_py.decoders import table_row
+from rail_msgs_py.parameters import parameter
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.track_code import CODE_RECEIVED
 from rail_msgs_py.topics.world import COMMAND, ODOMETER
@@ -26,7 +22,6 @@ from rail_onboard.localizer.located import located
 
 from .supervision import CodeSupervision
 
-_CODE, _ODOMETER, _LOCALIZER = "code", "odometer", "localizer"
 _FIELDS = ("speed", "gradient", "block_length", "network")
 
 
@@ -49,69 +44,42 @@ class CodeSupervisionParameters:
     )
 
 
-class CodeSupervisionNode(Equipment):
+class CodeSupervisionNode(
+    EquipmentNode[CodeSupervisionParameters], name="code_supervision", namespace="/train_1"
+):
     """Speed supervision as a managed node; switched off it demands the emergency brake."""
 
-    def __init__(
-        self,
-        name: str = "code_supervision",
-        *,
-        namespace: str = "/train_1",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        self._p = declare(self, CodeSupervisionParameters)
+    def setup(self) -> None:
+        """Open the ports of the train."""
+        train = self.place
+        self._command = self.table_out(
+            COMMAND, (train,), awaited=True, train=train, supervision=self.get_name()
+        )
+        self._code = self.inputs.port(CODE_RECEIVED, table_row(CODE_RECEIVED), train=train)
+        self._localizer = (
+            self.inputs.port(LOCALIZER_STATE, table_row(LOCALIZER_STATE), train=train)
+            if self._p.localizer
+            else ""
+        )
+        self._odometer = self.inputs.trigger(ODOMETER, table_row(ODOMETER), train=train)
+
+    def start_over(self) -> None:
+        """Have received no code."""
         self._supervision = CodeSupervision(
             braking_mps2=self._p.braking_mps2, odometer_error=self._p.odometer_error
         )
-        train = namespace.strip("/")
-        self._publish = self.stream_out(COMMAND, train=train, supervision=self.get_name())
-        self._table = TableWriter((train,), COMMAND.columns)
-        owners = {_CODE: CODE_RECEIVED.owner(train=train)}
-        if self._p.localizer:
-            owners[_LOCALIZER] = LOCALIZER_STATE.owner(train=train)
-            self.stream_in(LOCALIZER_STATE, self._on_located, train=train)
-        self._inbox: TickInbox[Any] = TickInbox([_ODOMETER, *owners])
-        self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
-        self.stream_in(CODE_RECEIVED, self._on_code, train=train)
-        self.stream_in(ODOMETER, self._on_odometer, train=train)
-        self.announce_when_connected()
 
-    def _on_code(self, raw: bytes) -> None:
-        stamp_ns, figures = figures_from_cdr(raw, 1, len(CODE_RECEIVED.columns))
-        self._inbox.put(stamp_ns, _CODE, figures[0].tolist())
-        self._advance()
-
-    def _on_odometer(self, raw: bytes) -> None:
-        stamp_ns, figures = figures_from_cdr(raw, 1, len(ODOMETER.columns))
-        self._inbox.put(stamp_ns, _ODOMETER, figures[0].tolist())
-        self._watch.begin()
-        self._advance()
-
-    def _on_located(self, raw: bytes) -> None:
-        stamp_ns, figures = figures_from_cdr(raw, 1, len(LOCALIZER_STATE.columns))
-        self._inbox.put(stamp_ns, _LOCALIZER, figures[0].tolist())
-        self._advance()
-
-    def _advance(self) -> None:
-        while self._inbox.complete:
-            self._watch.end()
-            self._supervise(*self._inbox.take())
-
-    def _supervise(self, stamp_ns: int, items: dict[str, Any]) -> None:
-        code, odometer = items.get(_CODE), items.get(_ODOMETER)
-        if odometer is None:
-            return
+    def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        """Judge the speed by the code, and command the brakes."""
+        code = items.get(self._code)
         carrier_hz, fields = None, None
         if code is not None and code[CODE_RECEIVED.index["carrier_hz"]] > 0.0:
             carrier_hz = code[CODE_RECEIVED.index["carrier_hz"]]
             if code[CODE_RECEIVED.index["valid"]] > 0.0:
                 fields = {name: round(code[CODE_RECEIVED.index[name]]) for name in _FIELDS}
-        distance_m, speed_mps = odometer
+        distance_m, speed_mps = items[self._odometer]
         way_m, fastest_mps, doubt_mps = None, None, 0.0
-        known = located(items.get(_LOCALIZER))
+        known = located(items.get(self._localizer))
         if known is not None:
             way_m = known.travelled(self._p.direction)
             speed_mps = known.believed_mps
@@ -133,7 +101,7 @@ class CodeSupervisionNode(Equipment):
             float(output.service_brake),
             float(emergency),
         ]
-        self._publish(self._table.write(stamp_ns, np.array([figures])))
+        self._command(stamp_ns, np.array([figures]))
         intervenes = emergency or output.service_brake
         self.report(
             DiagnosticStatus.WARN if intervenes else DiagnosticStatus.OK,
@@ -143,10 +111,5 @@ class CodeSupervisionNode(Equipment):
         )
 
 
-def main() -> None:
-    """Run the supervision of a train on its own."""
-    run_node(CodeSupervisionNode)
-
-
 if __name__ == "__main__":
-    main()
+    CodeSupervisionNode.main()

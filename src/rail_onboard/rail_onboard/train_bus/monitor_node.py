@@ -5,7 +5,6 @@ Topics in: ``/clock``, ``rx``. Topics out: ``tx``, ``state``, ``trace``, ``verdi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import nan
 from typing import Any
@@ -14,14 +13,10 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 
-from rail_msgs_py.failures import TickWatch
-from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import ParameterError, declare, parameter
-from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr
-from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import Table, TableWriter
-from rail_msgs_py.topics.tick import CLOCK
+from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.table import Table
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.train_bus import (
     BUS_STATE,
     BUS_TRACE,
@@ -40,7 +35,6 @@ from rail_signals.train_bus.train import train_consist, train_profiles
 
 from .cable_watch import BusWatch, Reading
 
-_CLOCK, _BUS = "clock", "bus"
 _LEVELS = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
 
 
@@ -72,25 +66,19 @@ class TrainBusMonitorParameters:
     )
 
 
-class TrainBusMonitorNode(Equipment):
+class TrainBusMonitorNode(
+    EquipmentNode[TrainBusMonitorParameters], name="train_bus_monitor", namespace="/train_1"
+):
     """A monitor as a managed node; switched off it does not measure."""
 
-    def __init__(
-        self,
-        name: str = "train_bus_monitor",
-        *,
-        namespace: str = "/train_1",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        self._p = p = declare(self, TrainBusMonitorParameters)
+    def setup(self) -> None:
+        """Draw the bus as built, choose the edge, and open the ports of the head."""
+        p, train = self._p, self.place
         try:
             self._profiles = list(train_profiles(p.cars))
             self._consist = train_consist(p.cars)
         except ValueError as error:
-            raise ParameterError(f"{name}: cars: {error}") from None
+            raise ParameterError(f"cars: {error}") from None
         self._instrument = Reflectometer(
             reference_ohm=self._consist.termination.resistance_ohm,
             rise_time_s=p.rise_time_s,
@@ -101,23 +89,22 @@ class TrainBusMonitorNode(Equipment):
         self._time_s = self._instrument.grid(samples).time_s
         edge = step_edge(self._time_s, p.rise_time_s)
         self._edges = np.tile(edge, (p.traces, 1)).astype(np.complex128)
-        self._watch_over = BusWatch(self._read)
         self._tick_ns = round(p.tick_s * NANOSECONDS)
         self._due_ns = round(p.offset_s * NANOSECONDS)
-        train = namespace.strip("/")
-        self._inbox: TickInbox[None] = TickInbox([_CLOCK, _BUS])
-        self._inbox.put(0, _BUS, None)
-        self._watch = TickWatch(self, self._inbox, {_BUS: p.medium}, p.timeout_s, self._advance)
+        # What was seen in a tick decides on measuring in the next.
+        self._is_seen = self.inputs.internal_port("bus", p.medium, delay_ns=self._tick_ns)
         self._send = self.stream_out(REFLECTOMETER_TX, train=train)
-        self._state = self.publisher(BUS_STATE, train=train).publish
-        self._state_table = TableWriter((train,), BUS_STATE.columns)
+        self._state = self.table_out(BUS_STATE, (train,), train=train)
         self._trace = self.publisher(BUS_TRACE, train=train)
         self._verdicts = self.publisher(BUS_VERDICTS, train=train)
         self._trend = self.publisher(BUS_TREND, train=train)
-        self._level = 0
         self.stream_in(REFLECTOMETER_RX, self._on_block, train=train)
-        self.stream_in(CLOCK, self._on_clock)
-        self.announce_when_connected()
+        self.inputs.clock()
+
+    def start_over(self) -> None:
+        """Have measured nothing."""
+        self._watch_over = BusWatch(self._read)
+        self._level = 0
 
     def _read(self, traces: Reflectogram) -> Reading:
         rate = self._p.false_alarm_rate
@@ -125,18 +112,7 @@ class TrainBusMonitorNode(Equipment):
 
     # Measuring ----------------------------------------------------------------------------
 
-    def _on_clock(self, raw: bytes) -> None:
-        self._inbox.put(clock_from_cdr(raw), _CLOCK, None)
-        self._watch.begin()
-        self._advance()
-
-    def _advance(self) -> None:
-        while self._inbox.complete:
-            self._watch.end()
-            stamp_ns, _ = self._inbox.take()
-            self._measure(stamp_ns)
-
-    def _measure(self, stamp_ns: int) -> None:
+    def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
         """Send edges if it is time to, or if what was seen last is in doubt."""
         due = stamp_ns >= self._due_ns
         if due:
@@ -155,10 +131,8 @@ class TrainBusMonitorNode(Equipment):
         block = Waveform.from_cdr(raw)
         if self.switched_on and not block.silent:
             self._understand(block.stamp_ns, np.ascontiguousarray(block.samples.real))
-        self._state(self._state_table.write(block.stamp_ns, self._figures()))
-        # What was seen in a tick decides on measuring in the next.
-        self._inbox.put(block.stamp_ns + self._tick_ns, _BUS, None)
-        self._advance()
+        self._state(block.stamp_ns, self._figures())
+        self._is_seen(block.stamp_ns, None)
 
     def _understand(self, stamp_ns: int, rows: NDArray[np.float64]) -> None:
         watch = self._watch_over
@@ -173,9 +147,9 @@ class TrainBusMonitorNode(Equipment):
         mean = rows.mean(axis=0, keepdims=True).astype(np.complex128)
         self._trace.publish(Waveform(stamp_ns, rate_hz, 0.0, 0, mean).to_msg())
         if is_read:
-            self._tell(stamp_ns)
+            self._report_cable(stamp_ns)
 
-    def _tell(self, stamp_ns: int) -> None:
+    def _report_cable(self, stamp_ns: int) -> None:
         """Say what has been understood anew."""
         watch = self._watch_over
         reading, held = watch.reading, watch.held
@@ -231,10 +205,5 @@ def _figures_of(measurement: RunMeasurement) -> tuple[float, float, float]:
     return length_m, impedance_ohm, attenuation_db
 
 
-def main() -> None:
-    """Run a monitor on its own."""
-    run_node(TrainBusMonitorNode)
-
-
 if __name__ == "__main__":
-    main()
+    TrainBusMonitorNode.main()

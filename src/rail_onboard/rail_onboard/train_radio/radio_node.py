@@ -6,22 +6,17 @@ Topics out: ``uplink``, ``telegrams``, ``link``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
-from numpy.typing import NDArray
 
-from rail_msgs_py.failures import TickWatch
-from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import ParameterError, declare, parameter
-from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr
-from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import TableWriter
-from rail_msgs_py.topics.tick import CLOCK
+from rail_msgs_py.decoders import samples, stamped
+from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.tick_inputs import TickInputs
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.train_radio import (
     CBTC_TRAIN_RX,
     CBTC_TRAIN_TX,
@@ -31,13 +26,11 @@ from rail_msgs_py.topics.train_radio import (
 )
 from rail_msgs_py.train_radio.parameters import TrainRadioParameters, slots_of
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
-from rail_msgs_py.waveform import Waveform, silence, silent_stamp_ns
+from rail_msgs_py.waveform import Waveform, silence
 from rail_signals.train_radio.burst import RadioBurstReceiver
 from rail_signals.train_radio.slots import frame_of
 
 from .base_selector import BaseSelector
-
-_CLOCK_PORT, _TELEGRAMS_PORT = "clock", "telegrams"
 
 
 @dataclass(frozen=True)
@@ -58,75 +51,50 @@ class CbtcRadioParameters(TrainRadioParameters):
     )
 
 
-class CbtcRadioNode(Equipment):
-    """A train radio as a managed node; switched off it neither sends nor hears."""
+class CbtcRadioNode(EquipmentNode[CbtcRadioParameters], name="cbtc_radio", namespace="/train_1"):
+    """A train radio as a managed node; switched off it neither sends nor hears.
 
-    def __init__(
-        self,
-        name: str = "cbtc_radio",
-        *,
-        namespace: str = "/train_1",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        self._p = p = declare(self, CbtcRadioParameters)
+    What it sends in a tick does not depend on what it receives in that tick: two steps, each with
+    inputs of its own.
+    """
+
+    def setup(self) -> None:
+        """Open the ports to air and train protection."""
+        p, train = self._p, self.place
         if len(p.downlink_channels) != len(p.uplink_carriers_hz):
             raise ParameterError(
-                f"{name}: uplink_carriers_hz: {p.uplink_carriers_hz}: one for each of"
+                f"uplink_carriers_hz: {p.uplink_carriers_hz}: one for each of"
                 f" {len(p.downlink_channels)} channels"
             )
         self._slots = slots_of(p)
         self._receiver = RadioBurstReceiver(self._slots.burst)
         self._amplitude = 10.0 ** (p.power_dbm / 20.0) * p.samples_per_symbol**0.5
         self._carriers_hz = dict(zip(p.downlink_channels, p.uplink_carriers_hz, strict=True))
-        self._selector = BaseSelector()
-        self._tick_ns = round(p.tick_s * NANOSECONDS)
-        train = namespace.strip("/")
-        self._orders: TickInbox[Telegrams | None] = TickInbox([_CLOCK_PORT, _TELEGRAMS_PORT])
-        self._orders.put(0, _TELEGRAMS_PORT, None)
-        owners = {_TELEGRAMS_PORT: f"/{train}/atp"}
-        self._watch = TickWatch(self, self._orders, owners, p.timeout_s, self._advance)
-        self._inbox: TickInbox[NDArray[np.complex128] | None] = TickInbox(
-            str(channel) for channel in p.downlink_channels
+        self._telegrams = self.inputs.port(
+            TRAIN_TELEGRAMS,
+            stamped(Telegrams.from_cdr),
+            delay_ns=round(p.tick_s * NANOSECONDS),
+            train=train,
         )
-        for channel in p.downlink_channels:
-            self.stream_in(
-                CBTC_TRAIN_RX,
-                lambda raw, channel=channel: self._on_block(channel, raw),
-                train=train,
-                channel=channel,
-            )
+        self.inputs.clock()
+        downlink = TickInputs(self, self._receive)
+        self._ports = {
+            channel: downlink.port(CBTC_TRAIN_RX, samples, train=train, channel=channel)
+            for channel in sorted(p.downlink_channels)
+        }
         self._send = self.stream_out(CBTC_TRAIN_TX, train=train)
-        self._tell = self.stream_out(RADIO_TELEGRAMS, train=train)
-        self._link = self.publisher(RADIO_LINK, train=train).publish
-        self._table = TableWriter((train,), RADIO_LINK.columns)
+        self._report_frames = self.stream_out(RADIO_TELEGRAMS, train=train)
+        self._link = self.table_out(RADIO_LINK, (train,), train=train)
         self._figures = np.zeros((1, len(RADIO_LINK.columns)))
-        self.stream_in(TRAIN_TELEGRAMS, self._on_telegrams, train=train)
-        self.stream_in(CLOCK, self._on_clock)
-        self.announce_when_connected()
 
-    # Up -----------------------------------------------------------------------------------
+    def start_over(self) -> None:
+        """Have no base station."""
+        self._selector = BaseSelector()
 
-    def _on_clock(self, raw: bytes) -> None:
-        self._orders.put(clock_from_cdr(raw), _CLOCK_PORT, None)
-        self._watch.begin()
-        self._advance()
-
-    def _on_telegrams(self, raw: bytes) -> None:
-        heard = Telegrams.from_cdr(raw)
-        self._orders.put(heard.stamp_ns + self._tick_ns, _TELEGRAMS_PORT, heard)
-        self._advance()
-
-    def _advance(self) -> None:
-        while self._orders.complete:
-            self._watch.end()
-            self._transmit(*self._orders.take())
-
-    def _transmit(self, stamp_ns: int, items: dict[str, Telegrams | None]) -> None:
+    def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        """Send the frame of train protection on the uplink in force."""
         channel = self._selector.channel
-        ordered = items.get(_TELEGRAMS_PORT)
+        ordered = items.get(self._telegrams)
         rate_hz = self._slots.burst.sample_rate_hz
         if not (self.switched_on and channel and ordered and ordered.frames):
             number = channel or self._p.downlink_channels[0]
@@ -136,37 +104,27 @@ class CbtcRadioNode(Equipment):
             block = Waveform(stamp_ns, rate_hz, self._carriers_hz[channel], channel, burst)
         self._send(block.to_cdr())
 
-    # Down ---------------------------------------------------------------------------------
-
-    def _on_block(self, channel: int, raw: bytes) -> None:
-        stamp_ns = silent_stamp_ns(raw)
-        if stamp_ns is not None:
-            self._inbox.put(stamp_ns, str(channel), None)
-        else:
-            block = Waveform.from_cdr(raw)
-            self._inbox.put(block.stamp_ns, str(channel), block.samples)
-        while self._inbox.complete:
-            self._receive(*self._inbox.take())
-
-    def _receive(self, stamp_ns: int, items: Mapping[str, NDArray[np.complex128] | None]) -> None:
-        heard = {int(port): block for port, block in items.items() if block is not None}
+    def _receive(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        """Report the frames of the train, and choose the base station by the beacons."""
+        received = {
+            channel: items[port] for channel, port in self._ports.items() if items[port] is not None
+        }
         frames: list[tuple[int, bytes]] = []
         beacons: dict[int, float] = {}
-        if self.switched_on and heard:
+        if self.switched_on and received:
             # Of each channel the beacon and the train's own slot, by the antennas of the scheme.
             antennas = self._slots.burst.scheme.receive
-            blocks = [heard[channel][:antennas] for channel in sorted(heard)]
-            cut = np.stack([self._slots.cut(block) for block in blocks])
+            cut = np.stack([self._slots.cut(block[:antennas]) for block in received.values()])
             found = self._receiver.receive(cut, doppler_hz=self._p.doppler_hz)
-            for row, channel in enumerate(sorted(heard)):
+            for row, number in enumerate(received):
                 if found.detected[row, 0]:
-                    beacons[channel] = float(np.mean(found.snr[row, 0]))
+                    beacons[number] = float(np.mean(found.snr[row, 0]))
                 if found.detected[row, 1]:
                     frames.append((self._p.slot, frame_of(found.bits[row, 1])))
         channel = self._selector.update(beacons)
-        self._tell(telegrams(stamp_ns, frames))
+        self._report_frames(telegrams(stamp_ns, frames))
         self._figures[0] = channel or 0, beacons.get(channel or 0, 0.0), len(frames)
-        self._link(self._table.write(stamp_ns, self._figures))
+        self._link(stamp_ns, self._figures)
         self.report(
             DiagnosticStatus.OK if beacons else DiagnosticStatus.WARN,
             "radio",
@@ -175,10 +133,5 @@ class CbtcRadioNode(Equipment):
         )
 
 
-def main() -> None:
-    """Run a train radio on its own."""
-    run_node(CbtcRadioNode)
-
-
 if __name__ == "__main__":
-    main()
+    CbtcRadioNode.main()

@@ -5,17 +5,14 @@ Topics in: ``/clock``. Topics out: ``tone``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.stamps import clock_from_cdr
-from rail_msgs_py.standalone import run_node
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import REFERENCE_TX
 from rail_msgs_py.topics.tick import CLOCK
 from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
@@ -33,20 +30,14 @@ class ReferenceStationParameters(ReferenceToneParameters):
     tick_s: float = parameter(0.1, "time of a tick", unit="s", low=0.01, high=1.0)
 
 
-class ReferenceStationNode(Equipment):
+class ReferenceStationNode(
+    EquipmentNode[ReferenceStationParameters], name="reference", namespace="/wayside/ref1"
+):
     """A reference station as a managed node; switched off it is silent."""
 
-    def __init__(
-        self,
-        name: str = "reference",
-        *,
-        namespace: str = "/wayside/ref1",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        p = declare(self, ReferenceStationParameters)
+    def setup(self) -> None:
+        """Make its tone, the same for all ticks."""
+        p = self._p
         plan = tone_plan_of(p)
         if not p.slot < plan.slots:
             raise ParameterError(f"slot: {p.slot} is not below {plan.slots}, the number of slots")
@@ -58,10 +49,8 @@ class ReferenceStationNode(Equipment):
         radio = (plan.sample_rate_hz, plan.carrier_hz, _CHANNEL)
         self._tone = RepeatedBlock(Waveform(0, *radio, samples[None, :]))
         self._silence = RepeatedBlock(silence(0, *radio))
-        station = namespace.rpartition("/")[2]
-        self._send = self.stream_out(REFERENCE_TX, station=station)
+        self._send = self.stream_out(REFERENCE_TX, station=self.place)
         self.stream_in(CLOCK, self._on_clock)
-        self.announce_when_connected()
 
     def _on_clock(self, raw: bytes) -> None:
         stamp_ns = clock_from_cdr(raw)
@@ -70,10 +59,5 @@ class ReferenceStationNode(Equipment):
         self.report(DiagnosticStatus.OK, "tone", message, stamp_ns=stamp_ns)
 
 
-def main() -> None:
-    """Run a reference station on its own."""
-    run_node(ReferenceStationNode)
-
-
 if __name__ == "__main__":
-    main()
+    ReferenceStationNode.main()

@@ -112,12 +112,12 @@ class RangingStation:
         variance_rad2 = estimate.variance_rad2 * self._noise_factor
         tones_hz = self.signal.tones_hz
         if self.comparator == "two_tone":
-            range_m, variance_m2, resolved = two_tone_range_m(
+            ranges_m, variances_m2, resolved = two_tone_range_m(
                 estimate.phase_lag_rad, variance_rad2, tones_hz, delay_s=self._delay_s
             )
             if not resolved:
                 return math.nan, math.inf
-            return float(range_m), float(variance_m2)
+            return float(ranges_m), float(variances_m2)
         variance_m2 = float(variance_rad2[0]) * self._per_radian_m**2
         if self.comparator == "and":
             return self._and_range_m(burst), variance_m2

@@ -5,19 +5,18 @@ Topics, for each of its zones: in ``/clock``, ``<zone>/rx``; out ``<zone>/tx``, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.ranging.range_reading import RangeWriter
 from rail_msgs_py.ranging.signal_parameters import SignalParameters, signal_of
 from rail_msgs_py.stamps import clock_from_cdr
-from rail_msgs_py.standalone import run_node
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.ranging import RANGE, WRS_RX, WRS_TX
 from rail_msgs_py.topics.tick import CLOCK
 from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence, silent_stamp_ns
@@ -59,74 +58,52 @@ class _Antenna:
     disturbance: str = ""
 
 
-class WrsNode(Equipment):
+class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
     """Wayside station as a managed node."""
 
-    def __init__(
-        self,
-        name: str = "wrs1",
-        *,
-        namespace: str = "/wayside",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        self._p = declare(self, WrsParameters)
+    def setup(self) -> None:
+        """Make the tone, and open the ports of the antenna into every zone."""
+        p = self._p
         self._check_parameters()
-        signal = signal_of(self._p)
+        signal = signal_of(p)
         self._station = RangingStation(
             signal,
-            self._p.comparator,  # type: ignore[arg-type]
-            self._p.delay_s,
-            noise_mw=10.0 ** (self._p.noise_dbm / 10.0),
+            p.comparator,  # type: ignore[arg-type]
+            p.delay_s,
+            noise_mw=10.0 ** (p.noise_dbm / 10.0),
         )
         tone = modulate(signal, np.zeros(len(signal.tones_hz)))
-        samples = tone[None, :] * 10.0 ** (self._p.power_dbm / 20.0)
+        samples = tone[None, :] * 10.0 ** (p.power_dbm / 20.0)
         low_m, high_m = self._station.interval_m
+        site = self.get_name()
         self._antennas: list[_Antenna] = []
         for zone, channel, uplink_channel, carrier_hz in zip(
-            self._p.zones,
-            self._p.downlink_channels,
-            self._p.uplink_channels,
-            self._p.downlink_carriers_hz,
-            strict=True,
+            p.zones, p.downlink_channels, p.uplink_channels, p.downlink_carriers_hz, strict=True
         ):
-            parts = {"site": name, "zone": zone}
             radio = (signal.sample_rate_hz, carrier_hz, channel)
             antenna = _Antenna(
                 RepeatedBlock(Waveform(0, *radio, samples)),
                 RepeatedBlock(silence(0, *radio)),
-                self.stream_out(WRS_TX, **parts),
-                self.stream_out(RANGE, **parts),
+                self.stream_out(WRS_TX, site=site, zone=zone),
+                self.stream_out(RANGE, site=site, zone=zone),
                 RangeWriter(zone, low_m, high_m),
                 uplink_channel,
             )
             self._antennas.append(antenna)
-            self.stream_in(
-                WRS_RX,
-                lambda raw, zone=zone, antenna=antenna: self._receive(zone, antenna, raw),
-                **parts,
-            )
+            self.stream_in(WRS_RX, partial(self._on_block, zone, antenna), site=site, zone=zone)
         self.stream_in(CLOCK, self._on_clock)
-        self.announce_when_connected()
 
     def _check_parameters(self) -> None:
-        counts = {
-            len(self._p.zones),
-            len(self._p.downlink_channels),
-            len(self._p.uplink_channels),
-            len(self._p.downlink_carriers_hz),
-        }
+        p = self._p
+        per_zone = (p.zones, p.downlink_channels, p.uplink_channels, p.downlink_carriers_hz)
+        counts = {len(values) for values in per_zone}
         if len(counts) != 1 or 0 in counts:
             raise ParameterError(
-                f"{self.get_name()}: zones: {self._p.zones}: every zone needs one downlink "
-                "channel, one uplink channel and one carrier"
+                f"zones: {p.zones}: every zone needs one downlink channel, one uplink channel and "
+                "one carrier"
             )
-        if self._p.comparator not in ("and", "quadrature", "two_tone"):
-            raise ParameterError(
-                f"{self.get_name()}: comparator: {self._p.comparator}: and, quadrature or two_tone"
-            )
+        if p.comparator not in ("and", "quadrature", "two_tone"):
+            raise ParameterError(f"comparator: {p.comparator}: and, quadrature or two_tone")
 
     def _on_clock(self, raw: bytes) -> None:
         stamp_ns = clock_from_cdr(raw)
@@ -134,7 +111,7 @@ class WrsNode(Equipment):
             block = antenna.tone if self.switched_on else antenna.quiet
             antenna.send(block.at(stamp_ns))
 
-    def _receive(self, zone: str, antenna: _Antenna, raw: bytes) -> None:
+    def _on_block(self, zone: str, antenna: _Antenna, raw: bytes) -> None:
         stamp_ns = silent_stamp_ns(raw)
         if stamp_ns is not None:
             reading = NOTHING_HEARD
@@ -159,10 +136,5 @@ class WrsNode(Equipment):
         )
 
 
-def main() -> None:
-    """Run a wayside station on its own."""
-    run_node(WrsNode)
-
-
 if __name__ == "__main__":
-    main()
+    WrsNode.main()

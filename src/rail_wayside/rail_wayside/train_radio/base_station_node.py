@@ -12,21 +12,16 @@ Topics in: ``/clock``, ``/wayside/zone_controller/<base>/telegrams`` or, with ``
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py.failures import TickWatch
-from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import declare, parameter
-from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr
-from rail_msgs_py.standalone import run_node
-from rail_msgs_py.topics.tick import CLOCK
+from rail_msgs_py.decoders import stamped
+from rail_msgs_py.parameters import parameter
+from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.train_radio import (
-    BACKBONE,
     BACKBONE_DOWN,
     CBTC_BASE_RX,
     CBTC_BASE_TX,
@@ -40,7 +35,6 @@ from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence, silent_stamp
 from rail_signals.train_radio.burst import RadioBurstReceiver
 from rail_signals.train_radio.slots import BEACON_SLOT, frame_of
 
-_CLOCK_PORT, _TELEGRAMS_PORT = "clock", "telegrams"
 BEACON = bytes(range(FRAME_BYTES))
 """What the beacon carries: trains look at how well it arrives, not at what it says."""
 
@@ -63,63 +57,42 @@ class CbtcBaseStationParameters(TrainRadioParameters):
     )
 
 
-class CbtcBaseStationNode(Equipment):
+class CbtcBaseStationNode(
+    EquipmentNode[CbtcBaseStationParameters], name="cbtc", namespace="/wayside/base1"
+):
     """A base station as a managed node; switched off it neither sends nor hears."""
 
-    def __init__(
-        self,
-        name: str = "cbtc",
-        *,
-        namespace: str = "/wayside/base1",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        self._p = p = declare(self, CbtcBaseStationParameters)
+    def setup(self) -> None:
+        """Make the beacon, and open the ports to air and network."""
+        p, base = self._p, self.place
         self._slots = slots_of(p)
         self._receiver = RadioBurstReceiver(self._slots.burst)
         # Waves of mean power 1 mW need an energy per symbol of as many samples.
         self._amplitude = 10.0 ** (p.power_dbm / 20.0) * p.samples_per_symbol**0.5
         self._beacon = self._slots.bursts([BEACON])[0]
-        self._tick_ns = round(p.tick_s * NANOSECONDS)
-        base = namespace.rpartition("/")[2]
-        radio = (self._slots.burst.sample_rate_hz, p.downlink_carrier_hz, p.downlink_channel)
-        self._radio = radio
-        self._silence = RepeatedBlock(silence(0, *radio))
-        self._inbox: TickInbox[Telegrams | None] = TickInbox([_CLOCK_PORT, _TELEGRAMS_PORT])
-        # What is to be sent in the first tick nobody can have said.
-        self._inbox.put(0, _TELEGRAMS_PORT, None)
-        owners = {_TELEGRAMS_PORT: BACKBONE if p.backbone else "/wayside/zone_controller"}
-        self._watch = TickWatch(self, self._inbox, owners, p.timeout_s, self._advance)
+        self._radio = (
+            self._slots.burst.sample_rate_hz,
+            p.downlink_carrier_hz,
+            p.downlink_channel,
+        )
+        self._silence = RepeatedBlock(silence(0, *self._radio))
         self._send = self.stream_out(CBTC_BASE_TX, base=base)
-        self._tell = self.stream_out(UP_TELEGRAMS, base=base)
-        ordered = BACKBONE_DOWN if p.backbone else DOWN_TELEGRAMS
-        self.stream_in(ordered, self._on_telegrams, base=base)
+        self._report_frames = self.stream_out(UP_TELEGRAMS, base=base)
+        self._telegrams = self.inputs.port(
+            BACKBONE_DOWN if p.backbone else DOWN_TELEGRAMS,
+            stamped(Telegrams.from_cdr),
+            delay_ns=round(p.tick_s * NANOSECONDS),
+            base=base,
+        )
         self.stream_in(CBTC_BASE_RX, self._on_block, base=base)
-        self.stream_in(CLOCK, self._on_clock)
-        self.announce_when_connected()
+        self.inputs.clock()
 
-    def _on_clock(self, raw: bytes) -> None:
-        self._inbox.put(clock_from_cdr(raw), _CLOCK_PORT, None)
-        self._watch.begin()
-        self._advance()
-
-    def _on_telegrams(self, raw: bytes) -> None:
-        heard = Telegrams.from_cdr(raw)
-        self._inbox.put(heard.stamp_ns + self._tick_ns, _TELEGRAMS_PORT, heard)
-        self._advance()
-
-    def _advance(self) -> None:
-        while self._inbox.complete:
-            self._watch.end()
-            self._transmit(*self._inbox.take())
-
-    def _transmit(self, stamp_ns: int, items: dict[str, Telegrams | None]) -> None:
+    def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        """Send the beacon, and to every train its newest frame."""
         if not self.switched_on:
             self._send(self._silence.at(stamp_ns))
             return
-        ordered = items.get(_TELEGRAMS_PORT)
+        ordered = items.get(self._telegrams)
         block = self._slots.block(ordered.newest(self._p.trains) if ordered else {})
         first, end = self._slots.span(BEACON_SLOT)
         block[:, first:end] = self._beacon
@@ -129,7 +102,7 @@ class CbtcBaseStationNode(Equipment):
     def _on_block(self, raw: bytes) -> None:
         stamp_ns = silent_stamp_ns(raw)
         if stamp_ns is not None:
-            self._tell(telegrams(stamp_ns))
+            self._report_frames(telegrams(stamp_ns))
             return
         block = Waveform.from_cdr(raw)
         frames: list[tuple[int, bytes]] = []
@@ -140,17 +113,12 @@ class CbtcBaseStationNode(Equipment):
             found = self._receiver.receive(cut[used], doppler_hz=self._p.doppler_hz)
             frames = [
                 (slot, frame_of(bits))
-                for slot, bits, heard in zip(used, found.bits, found.detected, strict=True)
-                if heard
+                for slot, bits, detected in zip(used, found.bits, found.detected, strict=True)
+                if detected
             ]
-        self._tell(telegrams(block.stamp_ns, frames))
+        self._report_frames(telegrams(block.stamp_ns, frames))
         self.report(DiagnosticStatus.OK, "radio", "hears trains", stamp_ns=block.stamp_ns)
 
 
-def main() -> None:
-    """Run a base station on its own."""
-    run_node(CbtcBaseStationNode)
-
-
 if __name__ == "__main__":
-    main()
+    CbtcBaseStationNode.main()

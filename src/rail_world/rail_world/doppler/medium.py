@@ -143,7 +143,8 @@ class ReferenceMedium:
 
     def _gain_db(self, distance_m: FloatArray) -> FloatArray:
         near = np.maximum(distance_m, _LEAST_M)
-        return -self._at_1m_db - 10.0 * self.description.path_loss_exponent * np.log10(near)
+        exponent = self.description.path_loss_exponent
+        return np.asarray(-self._at_1m_db - 10.0 * exponent * np.log10(near))
 
     def _distances(self, row: FloatArray, stations: list[int]) -> FloatArray:
         """Distance from each station at each sample [station, sample]."""

@@ -206,7 +206,7 @@ class BusMedium:
         """Standard normal numbers of the contacts in a tick."""
         if self._fault is None or not self._fault.spread:
             return np.zeros(1 + _MOST_TRACES)
-        return self._contacts.blocks(_CONTACTS, [self._index], tick)[0].astype(np.float64)
+        return np.asarray(self._contacts.blocks(_CONTACTS, [self._index], tick)[0], np.float64)
 
     def _source(self, samples: int) -> RealNoiseSource:
         if samples not in self._noise:

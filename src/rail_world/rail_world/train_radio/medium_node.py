@@ -1,4 +1,4 @@
-"""The medium of the train radio as a node: takes what every antenna sends, delivers what it hears.
+"""The medium of the train radio as a node: takes what antennas send, delivers what they receive.
 
 Topics in: ``/world/state``, every base station's ``downlink``, every train's ``uplink``. Topics
 out: every train's ``downlink``, every base station's ``uplink``, ``~/links``, ``~/done``.
@@ -6,21 +6,15 @@ out: every train's ``downlink``, every base station's ``uplink``, ``~/links``, `
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_msgs_py.failures import TickWatch
-from rail_msgs_py.headers import header_to_cdr
-from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.node import CorridorNode
-from rail_msgs_py.parameters import declare, parameter
-from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import TableWriter, figures_from_cdr
-from rail_msgs_py.topics.tick import DONE
+from rail_msgs_py.decoders import stamped
+from rail_msgs_py.parameters import parameter
 from rail_msgs_py.topics.train_radio import (
     CBTC_BASE_RX,
     CBTC_BASE_TX,
@@ -28,103 +22,54 @@ from rail_msgs_py.topics.train_radio import (
     CBTC_TRAIN_RX,
     CBTC_TRAIN_TX,
 )
-from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
-from rail_world.media import read_part
+from rail_world.medium_node import MediumNode, MediumParameters
 
 from .description import CbtcDescription
 from .medium import Burst, CbtcMedium, Links
 
-_STATE_PORT = "state"
-
 
 @dataclass(frozen=True)
-class CbtcMediumParameters:
+class CbtcMediumParameters(MediumParameters):
     """Parameters of the medium."""
 
-    world_file: str = parameter("", "JSON file with tracks, trains and media")
     burst_samples: int = parameter(1, "samples of a slot", low=1, high=1_000_000)
-    timeout_s: float = parameter(
-        2.0, "wall time after which a block is given up", unit="s", low=0.05, high=3600.0
-    )
 
 
-class CbtcMediumNode(CorridorNode):
+class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", namespace="/world"):
     """The medium of the train radio as a node."""
 
-    def __init__(
-        self,
-        *,
-        namespace: str = "/world",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(
-            "cbtc_medium", namespace, context=context, parameters=parameters, services=services
-        )
-        self._p = declare(self, CbtcMediumParameters)
-        described, part = read_part(self._p.world_file, "train_radio", CbtcDescription)
-        self._radio = radio = part
-        self._tick_ns = described.tick_ns
-        self._medium = CbtcMedium(radio, described.seed, described.tick_s)
-        owners: dict[str, str] = {}
-        self._base_ports = [CBTC_BASE_TX.name(base=b.name) for b in radio.base_stations]
-        self._train_ports = [CBTC_TRAIN_TX.name(train=name) for name in radio.trains]
-        self._base_out: list[Callable[[bytes], None]] = []
-        for base, port in zip(radio.base_stations, self._base_ports, strict=True):
-            owners[port] = CBTC_BASE_TX.owner(base=base.name)
-            self._base_out.append(self.stream_out(CBTC_BASE_RX, base=base.name))
-            self.stream_in(
-                CBTC_BASE_TX, lambda raw, port=port: self._put(port, raw), base=base.name
-            )
-        self._train_out: dict[tuple[int, int], Callable[[bytes], None]] = {}
-        for index, (train, port) in enumerate(zip(radio.trains, self._train_ports, strict=True)):
-            owners[port] = CBTC_TRAIN_TX.owner(train=train)
-            self.stream_in(CBTC_TRAIN_TX, lambda raw, port=port: self._put(port, raw), train=train)
-            for channel in radio.downlink_hz:
-                self._train_out[index, channel] = self.stream_out(
-                    CBTC_TRAIN_RX, train=train, channel=channel
-                )
-        self._inbox: TickInbox[Any] = TickInbox([_STATE_PORT, *owners])
-        self._watch = TickWatch(self, self._inbox, owners, self._p.timeout_s, self._advance)
-        self.stream_in(STATE, self._on_state)
-        self._links = self.publisher(CBTC_LINKS).publish
-        self._links_table = TableWriter(radio.trains, CBTC_LINKS.columns)
-        self._done = self.stream_out(DONE, node=self.get_fully_qualified_name())
-        rate_hz = radio.sample_rate_hz
-        self._silence_down = {
-            channel: RepeatedBlock(silence(0, rate_hz, carrier_hz, channel))
-            for channel, carrier_hz in radio.downlink_hz.items()
+    def setup(self) -> None:
+        """Open the ports of all base stations and trains."""
+        self._radio = radio = self.part("train_radio", CbtcDescription)
+        self._tick_ns = self._world.tick_ns
+        self._medium = CbtcMedium(radio, self._world.seed, self._world.tick_s)
+        read = stamped(Waveform.from_cdr)
+        bases = [base.name for base in radio.base_stations]
+        self._base_ports = [self.inputs.port(CBTC_BASE_TX, read, base=base) for base in bases]
+        self._train_ports = [
+            self.inputs.port(CBTC_TRAIN_TX, read, train=train) for train in radio.trains
+        ]
+        self._state = self.state_port(self.inputs, len(radio.trains))
+        self._base_out = [self.stream_out(CBTC_BASE_RX, base=base) for base in bases]
+        self._train_out = {
+            (index, channel): self.stream_out(CBTC_TRAIN_RX, train=train, channel=channel)
+            for index, train in enumerate(radio.trains)
+            for channel in radio.downlink_hz
         }
-        self._silence_up = {
-            channel: RepeatedBlock(silence(0, rate_hz, carrier_hz, channel))
-            for channel, carrier_hz in radio.uplink_hz.items()
+        self._links = self.table_out(CBTC_LINKS, radio.trains)
+        self._silence_down = self._silences(radio.downlink_hz)
+        self._silence_up = self._silences(radio.uplink_hz)
+
+    def _silences(self, carriers_hz: Mapping[int, float]) -> dict[int, RepeatedBlock]:
+        return {
+            channel: RepeatedBlock(silence(0, self._radio.sample_rate_hz, carrier_hz, channel))
+            for channel, carrier_hz in carriers_hz.items()
         }
-        self.announce_when_connected()
 
-    def _on_state(self, raw: bytes) -> None:
-        trains = len(self._radio.trains)
-        stamp_ns, state = figures_from_cdr(raw, trains, len(STATE.columns))
-        self._inbox.put(stamp_ns, _STATE_PORT, state)
-        self._watch.begin()
-        self._advance()
-
-    def _put(self, port: str, raw: bytes) -> None:
-        block = Waveform.from_cdr(raw)
-        self._inbox.put(block.stamp_ns, port, block)
-        self._advance()
-
-    def _advance(self) -> None:
-        while self._inbox.complete:
-            self._deliver(*self._inbox.take())
-
-    def _deliver(self, stamp_ns: int, items: dict[str, Any]) -> None:
-        self._watch.end()
-        state = items.get(_STATE_PORT)
-        if state is None:
-            return
-        links = self._medium.links(stamp_ns // self._tick_ns, stamp_ns * 1e-9, state)
+    def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        """Deliver both ways what arrives of the bursts of a tick."""
+        links = self._medium.links(stamp_ns // self._tick_ns, stamp_ns * 1e-9, items[self._state])
         bases = {
             index: items[port].samples
             for index, port in enumerate(self._base_ports)
@@ -138,7 +83,6 @@ class CbtcMediumNode(CorridorNode):
         self._deliver_down(stamp_ns, links, bases)
         self._deliver_up(stamp_ns, links, trains)
         self._publish_links(stamp_ns, links)
-        self._done(header_to_cdr(stamp_ns))
 
     def _span(self, slot: int) -> tuple[int, int]:
         return slot * self._p.burst_samples, (slot + 1) * self._p.burst_samples
@@ -209,7 +153,7 @@ class CbtcMediumNode(CorridorNode):
         best = np.argmax(down, axis=0)
         trains = np.arange(down.shape[1])
         table = np.stack([best.astype(np.float64), down[best, trains], up[best, trains]], axis=1)
-        self._links(self._links_table.write(stamp_ns, np.ascontiguousarray(table)))
+        self._links(stamp_ns, np.ascontiguousarray(table))
 
 
 def _burst(start: int, samples: NDArray[np.complex128], antennas: int) -> Burst:
@@ -220,10 +164,5 @@ def _burst(start: int, samples: NDArray[np.complex128], antennas: int) -> Burst:
     return Burst(start, samples)
 
 
-def main() -> None:
-    """Run the medium on its own."""
-    run_node(CbtcMediumNode)
-
-
 if __name__ == "__main__":
-    main()
+    CbtcMediumNode.main()

@@ -1,0 +1,150 @@
+"""What every kind of node of a corridor is made of: its parameters, its inputs, its tick.
+
+A node says its parameters by a frozen dataclass, opens its ports in `setup`, and answers a tick in
+`on_tick`:
+
+    class Repeater(EquipmentNode[RepeaterParameters], name="repeater", namespace="/wayside/r1"):
+        def setup(self) -> None:
+            self._received = self.inputs.port(INPUT, table_row(INPUT), site=self.place)
+            self.inputs.clock()
+            self._send = self.table_out(OUTPUT, (self.place,), awaited=True, site=self.place)
+
+        def start_over(self) -> None:
+            self._filter = Filter(self._p.gain)
+
+        def on_tick(self, stamp_ns: int, items: Mapping[str, Any]) -> None:
+            self._send(stamp_ns, self._filter.update(items.get(self._received)))
+
+Media add what they share in `rail_world.medium_node`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, ClassVar, Generic, TypeVar, get_args
+
+from .node import CorridorMixin, CorridorNode, Equipment, Services
+from .parameters import ParameterError, declare
+from .standalone import run_node
+from .tick_inputs import TickInputs
+
+Parameters = TypeVar("Parameters")
+
+
+class _Kind(CorridorMixin, Generic[Parameters]):
+    """Constructor, hand-over of parameters, and entry point of a kind of node.
+
+    A kind gives ``name`` and ``namespace`` as arguments of its class statement; they hold unless
+    the constructor is given others.
+
+    Parameters
+    ----------
+    name, namespace : str, optional
+    context : rclpy Context, optional
+    parameters : mapping, optional
+        Values that override the defaults, as from a parameter file.
+    services : bool or 'switches'
+        As of `rail_msgs_py.node.node_arguments`.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of bounds, or `setup` or `start_over` cannot work with it.
+    """
+
+    parameter_type: ClassVar[type[Any]]
+    default_name: ClassVar[str]
+    default_namespace: ClassVar[str]
+    _p: Parameters
+
+    def __init_subclass__(cls, *, name: str = "", namespace: str = "", **others: Any) -> None:
+        super().__init_subclass__(**others)
+        if not name:  # a base of other kinds
+            return
+        cls.default_name, cls.default_namespace = name, namespace
+        (cls.parameter_type,) = get_args(cls.__orig_bases__[0])
+
+    def __init__(
+        self,
+        name: str | None = None,
+        *,
+        namespace: str | None = None,
+        context: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        services: Services = True,
+    ) -> None:
+        super().__init__(
+            self.default_name if name is None else name,
+            self.default_namespace if namespace is None else namespace,
+            context=context,
+            parameters=parameters,
+            services=services,
+        )
+        self._p = declare(self, self.parameter_type)
+        try:
+            self._build()
+        except ValueError as error:
+            reason = str(error).splitlines()[0]
+            raise ParameterError(f"{self.get_name()}: {reason}") from error
+        self.announce_when_connected()
+
+    @classmethod
+    def main(cls) -> None:
+        """Run a node of this kind on its own."""
+        run_node(cls)
+
+    @cached_property
+    def place(self) -> str:
+        """Train or site that the node belongs to: the last level of its namespace."""
+        return str(self.get_namespace()).rpartition("/")[2]
+
+    @cached_property
+    def inputs(self) -> TickInputs:
+        """What `on_tick` waits for; overdue for ``timeout_s`` if that is a parameter."""
+        return TickInputs(self, self.on_tick, getattr(self._p, "timeout_s", None))
+
+    def _build(self) -> None:
+        self.setup()
+
+    def setup(self) -> None:
+        """Open the ports, and make what lasts as long as the node."""
+        raise NotImplementedError
+
+    def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        """Answer a tick of which every port has been heard or has failed.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Simulated time of the tick.
+        items : dict
+            What each port has received, by the name that it was given when opened.
+        """
+        raise NotImplementedError
+
+
+class TickNode(_Kind[Parameters], CorridorNode):
+    """Node that cannot be switched off."""
+
+
+class EquipmentNode(_Kind[Parameters], Equipment):
+    """Managed node: equipment that can be switched off and on.
+
+    Switched off it still answers every tick; `switched_on` tells whether it is.
+    """
+
+    def _build(self) -> None:
+        self.setup()
+        self.start_over()
+
+    def start_over(self) -> None:
+        """Forget everything that was before: called when it is built, and when it is switched on.
+
+        What a node learns from what it receives is made here, and nowhere else.
+        """
+
+    def on_activate(self, state: Any) -> Any:
+        """Lifecycle transition."""
+        self.start_over()
+        return super().on_activate(state)

@@ -1,0 +1,68 @@
+"""What every medium is as a node: it reads its part of the world file, and ends its ticks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar
+
+from rail_msgs_py.decoders import table
+from rail_msgs_py.headers import header_to_cdr
+from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.tick_inputs import TickInputs
+from rail_msgs_py.tick_node import TickNode
+from rail_msgs_py.topics.tick import DONE
+from rail_msgs_py.topics.world import STATE
+
+from .world_file import Part, read_world_file
+
+
+@dataclass(frozen=True)
+class MediumParameters:
+    """Parameters of every medium."""
+
+    world_file: str = parameter("", "JSON file with tracks, trains and media")
+    timeout_s: float = parameter(
+        2.0, "wall time after which a block is given up", unit="s", low=0.05, high=3600.0
+    )
+
+
+Parameters = TypeVar("Parameters", bound=MediumParameters)
+
+
+class MediumNode(TickNode[Parameters]):
+    """Node of a medium: `on_tick` takes what is sent and delivers what arrives.
+
+    The tick of the medium is done when `on_tick` has returned.
+    """
+
+    def _build(self) -> None:
+        self._world = read_world_file(self._p.world_file)
+        self._done = self.stream_out(DONE, node=self.get_fully_qualified_name())
+        super()._build()
+
+    @cached_property
+    def inputs(self) -> TickInputs:
+        """What `on_tick` waits for."""
+        return TickInputs(self, self._on_tick, self._p.timeout_s)
+
+    def _on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        self.on_tick(stamp_ns, items)
+        self._done(header_to_cdr(stamp_ns))
+
+    def part(self, name: str, kind: type[Part]) -> Part:
+        """Part of the world file under a name.
+
+        Raises
+        ------
+        ParameterError
+            If the world has no such part.
+        """
+        try:
+            return self._world.part(name, kind)
+        except LookupError as error:
+            raise ParameterError(f"world_file: {self._p.world_file}: {error}") from None
+
+    def state_port(self, inputs: TickInputs, trains: int) -> str:
+        """Port of the true state of all trains, an array [train, column]; it begins the tick."""
+        return inputs.trigger(STATE, table(STATE, trains))

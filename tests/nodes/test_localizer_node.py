@@ -39,6 +39,7 @@ TICK_S = 0.1
 TICK_NS = 100_000_000
 START_M = 1000.0
 ACCELERATION_MPS2 = 1.0
+CLAIM = IntegrityClaim(tick_s=TICK_S, oldest_s=1.5)
 #: In which filters that know neither a position nor the wheels' speed are lost.
 LOST_TICKS = 150
 #: A fix of the positioner: reason, chainage, speed, and their covariance.
@@ -202,6 +203,27 @@ def test_the_node_says_what_the_localizer_says(graph: Any) -> None:
         here.speed_mps,
     )
     assert train.position.variance_m2 == here.sigma_m**2
+
+
+def test_a_relayed_range_enters_with_its_age_and_its_sigma(graph: Any) -> None:
+    """Used in the tick after the one in which it was received."""
+    train = Train(graph, told=True, told_sigmas=5.0, zone_starts_m=(1001.0,), range_bias_m=0.4)
+    alone = Localizer(LocalizerSettings(ranging=RangeModel(bias_m=0.4), claim=CLAIM))
+    alone.place(START_M, 1.0)
+    received: tuple[float, float] | None = None
+    for tick in range(30):
+        state = train.tick(relayed=(tick * TICK_S - 0.3, relayed_m := train.range_m(), 2.5))
+        time_s = tick * TICK_NS / NANOSECONDS
+        ranging = None
+        if received is not None:
+            measured_s, range_m = received
+            age_s = time_s - measured_s
+            ranging = RangeFix(range_m, 0.25, age_s, float(range_m >= 1001.0))
+        here = Localization.of(
+            alone.tick(time_s, TickReadings(ranging, odometer=WheelSpeed(0.0, 0.0)))
+        )
+        assert (state["front_m"], state["low_m"]) == (here.position_m, here.low_m)
+        received = (tick * TICK_S - 0.3, relayed_m)
 
 
 @pytest.mark.parametrize("at", [1, 2, 3, 4, 5])
@@ -371,6 +393,9 @@ def test_the_first_carrier_after_the_switch_is_no_joint_passed(graph: Any) -> No
     train = Train(graph, **joints)
     train.tick(carrier_hz=1700.0)
     train.off_and_on()
+    assert train.tick(carrier_hz=2300.0)["reason"] == Reason.NO_FIX
+    # Nor is a later one, while it is not known which joint is near.
+    train.tick(carrier_hz=1700.0)
     assert train.tick(carrier_hz=2300.0)["reason"] == Reason.NO_FIX
 
 

@@ -110,6 +110,13 @@ def test_to_the_localizer_it_is_as_if_there_were_no_reading(
     assert localizer.rejections == {(SENSOR_OF[name], why): 1}
 
 
+def test_variances_that_are_both_negative_are_not_positive_for_their_product() -> None:
+    screen = ReadingScreen(OLDEST_S, MOST_ALIKE)
+    fix = GOOD["doppler"]._replace(variance_m2=-4.0, speed_variance_m2ps2=-1.0)
+    assert screened("doppler", fix, screen) is None
+    assert screen.counts == {(Sensor.DOPPLER, Rejection.BAD_VARIANCE): 1}
+
+
 @pytest.mark.parametrize("name", GOOD)
 def test_a_good_reading_is_used(name: str) -> None:
     localizer, untouched = running(), running()

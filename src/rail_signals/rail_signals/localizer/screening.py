@@ -200,7 +200,7 @@ class ReadingScreen:
             ),
             (
                 Rejection.BAD_VARIANCE,
-                (var_s > 0.0) & (var_v > 0.0) & (covariance * covariance < var_s * var_v),
+                (var_v > 0.0) & (covariance * covariance < var_s * var_v),
             ),
             (Rejection.FUTURE, age_s >= -SAME_TIME_S),
             (Rejection.TOO_OLD, age_s <= self._oldest_s),

@@ -16,7 +16,6 @@ themselves, and so do joints: they are held against the other sensors instead.
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from collections.abc import Sequence
 from enum import Enum
@@ -82,7 +81,6 @@ class _Last(NamedTuple):
 
 
 Reading = TypeVar("Reading", RangeFix, DopplerFix, BlockEntry, WheelSpeed)
-_LARGEST: Final = sys.float_info.max
 #: What takes the place of values that are not looked at; 0 if not named.
 _HARMLESS: Final = {"variance_m2": 1.0, "speed_variance_m2ps2": 1.0}
 #: Sensors with noise, whose values hardly ever repeat themselves.
@@ -111,7 +109,7 @@ class ReadingScreen:
 
     def __init__(self, oldest_s: float, most_alike: int) -> None:
         self._oldest_s, self._most_alike = oldest_s, most_alike
-        self._last = dict.fromkeys(Sensor, _Last())
+        self._last = [_Last() for _ in Sensor]
         self.rejected: list[Rejected] = []
         self.counts: Counter[tuple[Sensor, Rejection]] = Counter()
 
@@ -159,15 +157,18 @@ class ReadingScreen:
         valid, rejected_before = present, len(self.rejected)
         last, stamp_s = self._last[sensor], time_s - age_s
         for why, passed in self._checks(age_s, stamp_s - last.stamp_s, content):
-            valid = self._sift(sensor, why, valid, passed)
+            if passed is not True:
+                valid = self._sift(sensor, why, valid, passed)
         alike = 1.0 + last.alike * (
             (content.chainage_m == last.chainage_m) & (content.speed_mps == last.speed_mps)
         )
         now = _Last(stamp_s, content.chainage_m, content.speed_mps, alike)
-        self._last[sensor] = _Last(*(_where(valid, *pair) for pair in zip(now, last, strict=True)))
-        evidence = valid
-        if sensor in _NOISY:
-            evidence = self._sift(sensor, Rejection.FROZEN, valid, alike < self._most_alike)
+        if valid is not True:
+            now = _Last(*(_where(valid, *pair) for pair in zip(now, last, strict=True)))
+        self._last[sensor] = now
+        evidence, measures = valid, alike < self._most_alike
+        if measures is not True and sensor in _NOISY:
+            evidence = self._sift(sensor, Rejection.FROZEN, valid, measures)
         return present if len(self.rejected) == rejected_before else evidence
 
     def _sift(self, sensor: Sensor, why: Rejection, valid: Flags, passed: Flags) -> Flags:
@@ -188,10 +189,8 @@ class ReadingScreen:
         NaN compares with nothing, so every check is one that it fails. The time since the last
         reading is NaN before there is one, and passes.
         """
-        s, v, var_s, covariance, var_v, _ = content
-        finite = _within(age_s, _LARGEST)
-        for values in content:
-            finite = finite & _within(values, _LARGEST)
+        s, v, var_s, covariance, var_v, label = content
+        finite = 0.0 * (age_s + s + v + var_s + covariance + var_v + label) == 0.0
         return (
             (Rejection.NOT_FINITE, finite),
             (

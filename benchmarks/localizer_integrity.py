@@ -1,14 +1,14 @@
-"""Integrity of the localizer: levels exceeded, faults found, and what a tick costs.
+"""Integrity of the localizer: levels misleading, faults found, and what a tick costs.
 
     python benchmarks/localizer_integrity.py [--runs N] [--ticks N] [--seed N] [--json FILE]
         [--only TEXT] [--mismatch] [--cost]
 
-Trains run on a simulated line (`localizer_simulation`), each with one fault of one sensor
-(`localizer_faults`) that begins after 5 to 40 s and lasts, and without any. Counted are, of the
-positions that are claimed to survive a fault of that sensor, those where the train was outside
-of the protection level; and how long the sensor went on telling readings that are off by much
-until a fault was found, against the stated time. Positions of one run are not independent: the runs
-in which a level was exceeded are counted as well.
+Trains run on a simulated line (`study.simulation`), each with one fault of one sensor
+(`study.faults`) that begins after 5 to 40 s and lasts, and without any. Counted are, of the
+positions that are claimed to survive a fault of that sensor, those that were misleading: the train
+was outside of the protection level; and how long the sensor went on with readings that are off by
+much until a fault was found, against the stated time. Positions of one run are not independent: the
+runs that were misled are counted as well.
 
 --mismatch  worlds that are not as the filters believe: biases that change faster or more slowly,
             worse wheels, more slips, more outages. No fault, and a range that drifts.
@@ -31,16 +31,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from rail_signals.localizer.core import LocalizerCore
+from rail_signals.localizer.localizer import Localizer
 from rail_signals.localizer.readings import (
-    DopplerReading,
-    OdometerReading,
-    RangeReading,
+    DopplerFix,
+    RangeFix,
     TickReadings,
+    WheelSpeed,
 )
 from rail_signals.localizer.settings import LocalizerSettings, Sensor
 from rail_signals.localizer.study.campaign import Tally, stated_s, tally
-from rail_signals.localizer.study.faults import CASES, Kind
+from rail_signals.localizer.study.faults import CASES, FaultKind
 from rail_signals.localizer.study.simulation import SimulatedLine
 
 MISMATCHES = {
@@ -65,9 +65,9 @@ class Row:
     positions: int
     claimed: float
     protected: float
-    exceeded: int
-    exceeding_runs: int
-    speed_exceeded: int
+    misleading: int
+    misleading_runs: int
+    misleading_speeds: int
     false_alarms: int
     wrong_exclusions: int
     healthy_h: float
@@ -84,7 +84,7 @@ class Row:
 
     @classmethod
     def of(cls, counted: Tally) -> Row:
-        """Figures of a count."""
+        """Values of a count."""
         delays = np.sort(counted.delays_s)
         places = [math.ceil(q * delays.size) - 1 for q in (0.5, 0.95, 1.0)]
         p50, p95, most = (float(delays[at]) if delays.size else math.nan for at in places)
@@ -96,9 +96,9 @@ class Row:
             counted.positions,
             counted.claimed / counted.positions,
             counted.protected / counted.positions,
-            counted.exceeded,
-            counted.exceeding_runs,
-            counted.speed_exceeded,
+            counted.misleading,
+            counted.misleading_runs,
+            counted.misleading_speeds,
             counted.false_alarms,
             counted.wrong_exclusions,
             counted.healthy_s / 3600.0,
@@ -117,8 +117,8 @@ class Row:
     def __str__(self) -> str:
         return (
             f"{self.sensor:9} {self.fault:14} {self.positions:8d} {100 * self.claimed:6.2f}"
-            f" {100 * self.protected:6.2f} {self.exceeded:5d} /{self.exceeding_runs:3d}"
-            f" {self.speed_exceeded:5d}  {self.due:4d} {self.late:4d} {self.excluded:4d}"
+            f" {100 * self.protected:6.2f} {self.misleading:5d} /{self.misleading_runs:3d}"
+            f" {self.misleading_speeds:5d}  {self.due:4d} {self.late:4d} {self.excluded:4d}"
             f" {self.delay_p50_s:6.1f} {self.delay_p95_s:6.1f} {self.delay_max_s:6.1f}"
             f" {self.stated_s:6.1f}  {self.protection_mean_m:6.1f} {self.protection_p95_m:6.1f}"
             f" {self.rmse_m:6.2f}"
@@ -126,7 +126,7 @@ class Row:
 
 
 HEAD = (
-    f"{'sensor':9} {'fault':14} {'posit.':>8} {'claim%':>6} {'prot.%':>6} {'exceeded':>10}"
+    f"{'sensor':9} {'fault':14} {'posit.':>8} {'claim%':>6} {'prot.%':>6} {'misleading':>10}"
     f" {'speed':>5}  {'due':>4} {'late':>4} {'out':>4} {'p50 s':>6} {'p95 s':>6} {'max s':>6}"
     f" {'stated':>6}  {'PL m':>6} {'p95 m':>6} {'rmse':>6}"
 )
@@ -136,7 +136,7 @@ def campaign(
     line: SimulatedLine, runs: int, ticks: int, seed: int, only: str = ""
 ) -> Iterator[Row]:
     """All cells, one after the other."""
-    cases: list[tuple[Sensor | None, Kind | None]] = [(None, None), *CASES]
+    cases: list[tuple[Sensor | None, FaultKind | None]] = [(None, None), *CASES]
     for number, (sensor, kind) in enumerate(cases):
         name = "none" if sensor is None or kind is None else f"{sensor.name.lower()} {kind.value}"
         if only in name:
@@ -151,9 +151,9 @@ def summary(rows: list[Row]) -> dict[str, float]:
     return {
         "positions": sum(row.positions for row in rows),
         "claimed": claimed,
-        "exceeded": sum(row.exceeded for row in rows),
-        "rate": sum(row.exceeded for row in rows) / claimed,
-        "worst_cell_rate": max(row.exceeded / (row.claimed * row.positions) for row in rows),
+        "misleading": sum(row.misleading for row in rows),
+        "rate": sum(row.misleading for row in rows) / claimed,
+        "worst_cell_rate": max(row.misleading / (row.claimed * row.positions) for row in rows),
         "false_alarms": sum(row.false_alarms for row in rows),
         "wrong_exclusions": sum(row.wrong_exclusions for row in rows),
         "healthy_h": sum(row.healthy_h for row in rows),
@@ -191,24 +191,24 @@ def cost(ticks: int = 3000) -> dict[str, float]:
     """Quantiles of the time of a tick [us], and of an addition of two arrays of 7 x 11."""
     rng = np.random.default_rng(1)
     speed_mps = 20.0
-    figures: dict[str, float] = {}
+    times_us: dict[str, float] = {}
     for name, with_doppler in (("range, wheels", False), ("range, Doppler, wheels", True)):
-        core = LocalizerCore(LocalizerSettings())
-        core.place(0.0, 1.0, speed_mps=speed_mps)
+        localizer = Localizer(LocalizerSettings())
+        localizer.place(0.0, 1.0, speed_mps=speed_mps)
         times, additions = np.zeros((2, ticks))
         one, two = rng.standard_normal((2, 7, 11))
         for tick, noise in enumerate(rng.standard_normal((ticks, 4)).tolist()):
             s = speed_mps * 0.1 * tick
             readings = TickReadings(
-                RangeReading(s + 0.2 * noise[0], 0.04, 0.0, s // 1500.0),
-                DopplerReading(s + 3.0 * noise[1], speed_mps + 0.3 * noise[2], 9.0, 0.5, 0.09, 0.0)
+                RangeFix(s + 0.2 * noise[0], 0.04, 0.0, s // 1500.0),
+                DopplerFix(s + 3.0 * noise[1], speed_mps + 0.3 * noise[2], 9.0, 0.5, 0.09, 0.0)
                 if with_doppler
                 else None,
                 None,
-                OdometerReading(1.005 * speed_mps + 0.03 * noise[3], 0.0),
+                WheelSpeed(1.005 * speed_mps + 0.03 * noise[3], 0.0),
             )
             start = time.perf_counter()
-            core.step(0.1 if tick else 0.0, readings)
+            localizer.tick(0.1 * tick, readings)
             middle = time.perf_counter()
             for _ in range(8):
                 one + two
@@ -216,12 +216,12 @@ def cost(ticks: int = 3000) -> dict[str, float]:
             times[tick] = middle - start
         quick, median = np.percentile(times * 1e6, [5, 50])
         unit = float(np.percentile(additions * 1e6, 5))
-        figures |= {f"{name}, p5": quick, f"{name}, p50": median, f"{name}, addition p5": unit}
+        times_us |= {f"{name}, p5": quick, f"{name}, p50": median, f"{name}, addition p5": unit}
         print(
             f"{name}: p5 {quick:.0f} us, p50 {median:.0f} us a tick;"
             f" an addition p5 {unit:.2f} us: {quick / unit:.0f} of them"
         )
-    return figures
+    return times_us
 
 
 def main() -> None:

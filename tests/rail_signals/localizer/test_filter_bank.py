@@ -23,11 +23,11 @@ from rail_signals.localizer.filter_bank import (
     singer,
 )
 from rail_signals.localizer.readings import (
-    BlockReading,
-    DopplerReading,
-    Intake,
-    OdometerReading,
-    RangeReading,
+    BlockEntry,
+    DopplerFix,
+    MeasurementModel,
+    RangeFix,
+    WheelSpeed,
 )
 from rail_signals.localizer.settings import (
     BlockModel,
@@ -124,15 +124,15 @@ def test_by_wheels_alone_the_uncertainty_grows_with_the_way() -> None:
         noise_mps=1e-3, scale=0.01, scale_length_m=inf, creep=0.0, creep_mps=1e-4
     )
     settings = LocalizerSettings(odometer=wheels)
-    bank, intake = FilterBank(settings), Intake(settings)
+    bank, model = FilterBank(settings), MeasurementModel(settings)
     bank.place(np.array(True), 0.0, 0.5, 20.0, 30.0)
     for tick in range(1, 2001):
         bank.predict(0.1, 1e-4, False)
-        intake.odometer(bank, OdometerReading(20.0, 0.0), 20.0, USES[Sensor.ODOMETER])
+        model.odometer(bank, WheelSpeed(20.0, 0.0), 20.0, USES[Sensor.ODOMETER])
         if tick in (500, 2000):
-            way_m = 2.0 * tick
+            distance_m = 2.0 * tick
             sigma_m = np.sqrt(bank.variances[S][USES[Sensor.ODOMETER]])
-            np.testing.assert_allclose(sigma_m, np.hypot(0.5, 0.01 * way_m), rtol=2e-2)
+            np.testing.assert_allclose(sigma_m, np.hypot(0.5, 0.01 * distance_m), rtol=2e-2)
 
 
 def random_reading(
@@ -154,13 +154,13 @@ def test_it_is_the_filter_that_the_textbook_has() -> None:
     for tick in range(60):
         bank.predict(0.1, 0.5, False)
         transition, added = singer(0.1, settings.motion)
-        way_m = 0.1 * abs(x[V])
+        distance_m = 0.1 * abs(x[V])
         kept = np.exp(
             [
-                -way_m / settings.odometer.scale_length_m,
+                -distance_m / settings.odometer.scale_length_m,
                 -0.1 / settings.odometer.correlation_s,
-                -way_m / settings.ranging.bias_length_m,
-                -way_m / settings.doppler.length_m,
+                -distance_m / settings.ranging.bias_length_m,
+                -distance_m / settings.doppler.length_m,
             ]
         )
         whole = np.diag([1.0, 1.0, 1.0, *kept])
@@ -186,26 +186,30 @@ def test_it_is_the_filter_that_the_textbook_has() -> None:
 
 def test_covariances_stay_symmetric_and_positive_definite() -> None:
     settings = LocalizerSettings()
-    bank, intake, rng = FilterBank(settings, (3,)), Intake(settings), np.random.default_rng(5)
+    bank, model, rng = (
+        FilterBank(settings, (3,)),
+        MeasurementModel(settings),
+        np.random.default_rng(5),
+    )
     on, zero = np.ones((3, 1), np.bool_), np.zeros((3, 1))
     for tick in range(600):
         bank.predict(0.1, float(10.0 ** rng.uniform(-3, 1)), bool(tick % 97 == 0))
         chosen = rng.uniform(size=4)
         if chosen[0] < 0.5:
-            fix = RangeReading(zero, zero + 1e-6, zero + 0.3, zero, on)
-            intake.range(bank, fix, np.broadcast_to(USES[Sensor.RANGE], (3, 11)))
+            fix = RangeFix(zero, zero + 1e-6, zero + 0.3, zero, on)
+            model.range(bank, fix, np.broadcast_to(USES[Sensor.RANGE], (3, 11)))
         if chosen[1] < 0.3:
             correlation = 0.999999
-            doppler = DopplerReading(
+            doppler = DopplerFix(
                 zero, zero, zero + 2500.0, zero + 500.0 * correlation, zero + 100.0, zero, on
             )
-            intake.doppler(bank, doppler, np.broadcast_to(USES[Sensor.DOPPLER], (3, 11)))
+            model.doppler(bank, doppler, np.broadcast_to(USES[Sensor.DOPPLER], (3, 11)))
         if chosen[2] < 0.1:
-            block = BlockReading(zero, zero, on)
-            intake.block(bank, block, np.broadcast_to(USES[Sensor.BLOCK], (3, 11)))
+            block = BlockEntry(zero, zero, on)
+            model.block(bank, block, np.broadcast_to(USES[Sensor.BLOCK], (3, 11)))
         if chosen[3] < 0.9:
-            wheels = OdometerReading(zero, zero, on)
-            intake.odometer(bank, wheels, 0.0, np.broadcast_to(USES[Sensor.ODOMETER], (3, 11)))
+            wheels = WheelSpeed(zero, zero, on)
+            model.odometer(bank, wheels, 0.0, np.broadcast_to(USES[Sensor.ODOMETER], (3, 11)))
         bank.lose()
         np.testing.assert_array_equal(bank.p, bank.p.swapaxes(0, 1))
         if tick % 20 == 0:
@@ -232,7 +236,7 @@ def test_errors_are_as_large_as_the_covariance_says() -> None:
         ranging=RangeModel(bias_m=0.5, bias_length_m=inf),
         odometer=OdometerModel(scale_length_m=inf),
     )
-    bank, intake = FilterBank(settings, (runs,)), Intake(settings)
+    bank, model = FilterBank(settings, (runs,)), MeasurementModel(settings)
     place = np.ones(runs, np.bool_)
     prior = np.diag([4.0, 0.25, 1.0, 0.02**2, 0.0, 0.25, 0.64])
     prior[A, A] = settings.motion.acceleration_mps2**2
@@ -252,15 +256,15 @@ def test_errors_are_as_large_as_the_covariance_says() -> None:
         s, v, _, k, u, b, d = truth[:, :, None]
         noise = rng.standard_normal((5, runs, 1))
         outcomes = {
-            Sensor.ODOMETER: intake.odometer(
+            Sensor.ODOMETER: model.odometer(
                 bank,
-                OdometerReading(v + k * 20.0 + u + 0.05 * noise[0], zero, on),
+                WheelSpeed(v + k * 20.0 + u + 0.05 * noise[0], zero, on),
                 20.0,
                 np.broadcast_to(USES[Sensor.ODOMETER], (runs, 11)),
             ),
-            Sensor.RANGE: intake.range(
+            Sensor.RANGE: model.range(
                 bank,
-                RangeReading(s + b + 0.3 * noise[1], zero + 0.09, zero, zero, on),
+                RangeFix(s + b + 0.3 * noise[1], zero + 0.09, zero, zero, on),
                 np.broadcast_to(USES[Sensor.RANGE], (runs, 11)),
             ),
         }
@@ -268,17 +272,17 @@ def test_errors_are_as_large_as_the_covariance_says() -> None:
             variance, mixed, speed = 9.0, 1.2, 0.25
             lower = np.linalg.cholesky([[variance, mixed], [mixed, speed]])
             error = np.einsum("ij,jrk->irk", lower, noise[2:4])
-            fix = DopplerReading(
+            fix = DopplerFix(
                 s + 3.0 * d + error[0],
                 v + mixed / 3.0 * d + error[1],
                 *(zero + variance, zero + mixed, zero + speed, zero, on),
             )
             use = np.broadcast_to(USES[Sensor.DOPPLER], (runs, 11))
-            outcomes[Sensor.DOPPLER] = intake.doppler(bank, fix, use)
+            outcomes[Sensor.DOPPLER] = model.doppler(bank, fix, use)
         if tick % 20 == 0:
-            entry = BlockReading(s + settings.block.survey_m * noise[4], zero, on)
+            entry = BlockEntry(s + settings.block.survey_m * noise[4], zero, on)
             use = np.broadcast_to(USES[Sensor.BLOCK], (runs, 11))
-            outcomes[Sensor.BLOCK] = intake.block(bank, entry, use)
+            outcomes[Sensor.BLOCK] = model.block(bank, entry, use)
         for sensor, outcome in outcomes.items():
             for row in outcome:
                 squared[sensor].append((row.innovation**2 / row.variance)[:, 0])
@@ -300,7 +304,7 @@ def test_the_difference_of_two_filters_has_the_difference_of_their_variances() -
     """What the tests for faults rest on: ``var(x_sub - x_full) = P_sub - P_full``."""
     runs, rng = 1000, np.random.default_rng(2)
     settings = LocalizerSettings(block=BlockModel(detection_s=0.0, survey_m=0.5))
-    bank, intake = FilterBank(settings, (runs,)), Intake(settings)
+    bank, model = FilterBank(settings, (runs,)), MeasurementModel(settings)
     bank.place(np.ones(runs, np.bool_), np.zeros((runs, 1)), 2.0, 20.0, 0.5)
     s = 2.0 * rng.standard_normal((runs, 1))
     v = 20.0 + 0.5 * rng.standard_normal((runs, 1))
@@ -310,12 +314,12 @@ def test_the_difference_of_two_filters_has_the_difference_of_their_variances() -
     # The present only, so that nothing but the readings is random.
     for _ in range(20):
         noise = rng.standard_normal((3, runs, 1))
-        wheels = OdometerReading(v + 20.0 * k + 0.05 * noise[0], zero, on)
-        intake.odometer(bank, wheels, 20.0, np.broadcast_to(USES[Sensor.ODOMETER], (runs, 11)))
-        fix = RangeReading(s + b + 0.3 * noise[1], zero + 0.09, zero, zero, on)
-        intake.range(bank, fix, np.broadcast_to(USES[Sensor.RANGE], (runs, 11)))
-        entry = BlockReading(s + 0.5 * noise[2], zero, on)
-        intake.block(bank, entry, np.broadcast_to(USES[Sensor.BLOCK], (runs, 11)))
+        wheels = WheelSpeed(v + 20.0 * k + 0.05 * noise[0], zero, on)
+        model.odometer(bank, wheels, 20.0, np.broadcast_to(USES[Sensor.ODOMETER], (runs, 11)))
+        fix = RangeFix(s + b + 0.3 * noise[1], zero + 0.09, zero, zero, on)
+        model.range(bank, fix, np.broadcast_to(USES[Sensor.RANGE], (runs, 11)))
+        entry = BlockEntry(s + 0.5 * noise[2], zero, on)
+        model.block(bank, entry, np.broadcast_to(USES[Sensor.BLOCK], (runs, 11)))
     for child in range(1, len(FILTERS)):
         gained = (bank.variances[S, :, child] - bank.variances[S, :, 0]).mean()
         apart = bank.x[S, :, child] - bank.x[S, :, 0]

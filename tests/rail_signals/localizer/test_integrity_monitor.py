@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from rail_signals.localizer.core import LocalizerCore
 from rail_signals.localizer.filter_bank import (
     DOPPLER_BIAS,
     FILTERS,
@@ -20,7 +19,8 @@ from rail_signals.localizer.filter_bank import (
     V,
 )
 from rail_signals.localizer.integrity_monitor import IntegrityMonitor
-from rail_signals.localizer.protection_level import ClaimMaker, Estimate, Reason, Status
+from rail_signals.localizer.localizer import Localizer
+from rail_signals.localizer.protection_level import Estimate, ProtectionLevels, Reason, Status
 from rail_signals.localizer.readings import TickReadings
 from rail_signals.localizer.settings import IntegrityClaim, LocalizerSettings, Sensor
 from rail_signals.localizer.study.simulation import SimulatedLine, SimulatedMotion, SimulatedSensors
@@ -51,7 +51,7 @@ def without(*sensors: Sensor) -> frozenset[Sensor]:
 def judged(bank: FilterBank, monitor: IntegrityMonitor | None = None) -> Estimate:
     monitor = IntegrityMonitor(CLAIM) if monitor is None else monitor
     monitor.test(bank, 0.1)
-    return ClaimMaker(CLAIM).estimate(bank, monitor, 0.1)
+    return ProtectionLevels(CLAIM).estimate(bank, monitor, 0.1)
 
 
 @pytest.mark.parametrize("risk", [1e-3, 1e-5, 1e-9])
@@ -165,12 +165,12 @@ def test_speeds_are_claimed_in_the_same_way() -> None:
 
 
 def test_an_estimate_stays_as_it_was() -> None:
-    core = LocalizerCore(SETTINGS, (2,))
-    core.place(np.zeros((2, 1)), 1.0, speed_mps=10.0)
-    told = core.step(0.0, TickReadings())
-    before = told.position_m.copy()
-    core.step(1.0, TickReadings())
-    np.testing.assert_array_equal(told.position_m, before)
+    localizer = Localizer(SETTINGS, (2,))
+    localizer.place(np.zeros((2, 1)), 1.0, speed_mps=10.0)
+    estimate = localizer.tick(0.0, TickReadings())
+    before = estimate.position_m.copy()
+    localizer.tick(1.0, TickReadings())
+    np.testing.assert_array_equal(estimate.position_m, before)
 
 
 @pytest.mark.parametrize("sensor", [Sensor.RANGE, Sensor.DOPPLER, Sensor.ODOMETER])
@@ -186,8 +186,8 @@ def test_a_filter_knows_nothing_of_the_sensor_it_leaves_out(sensor: Sensor) -> N
         rng = np.random.default_rng(7)
         motion = SimulatedMotion(runs, 1, line.tick_s, rng)
         sensors = SimulatedSensors(line, runs, 1, rng)
-        core = LocalizerCore(settings, (runs,))
-        core.monitor._threshold2 = np.inf
+        localizer = Localizer(settings, (runs,))
+        localizer.monitor._threshold2 = np.inf
         for tick in range(80):
             readings = sensors.read(motion.step())._replace(block=None)
             if wrong and tick > 20:
@@ -198,10 +198,10 @@ def test_a_filter_knows_nothing_of_the_sensor_it_leaves_out(sensor: Sensor) -> N
                     if key != "present"
                 }
                 readings = readings._replace(**{name: reading._replace(**changed)})
-            core.step(line.tick_s if tick else 0.0, readings)
+            localizer.tick(tick * line.tick_s, readings)
         # How much wheels slip is no matter to filters that do not look at them.
         states = [S, V, A, RANGE_BIAS, DOPPLER_BIAS]
-        found.append((core.bank.x[states], core.bank.p[np.ix_(states, states)]))
+        found.append((localizer.bank.x[states], localizer.bank.p[np.ix_(states, states)]))
     for healthy, faulty in zip(*found, strict=True):
         np.testing.assert_array_equal(healthy[..., left_out], faulty[..., left_out])
         assert not np.array_equal(healthy[..., 0], faulty[..., 0])

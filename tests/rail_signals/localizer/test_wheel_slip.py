@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rail_signals.localizer.readings import OdometerReading
+from rail_signals.localizer.readings import WheelSpeed
 from rail_signals.localizer.settings import OdometerModel
-from rail_signals.localizer.wheel_slip import WheelWatch
+from rail_signals.localizer.wheel_slip import SlipDetector
 
 MODEL = OdometerModel()
 
 
-def watched(speeds_mps: np.ndarray, step_s: float = 0.1) -> tuple[WheelWatch, list[float]]:
+def watched(speeds_mps: np.ndarray, step_s: float = 0.1) -> tuple[SlipDetector, list[float]]:
     """Return a watch that has seen wheel speeds, and the slip that it reckoned with."""
-    watch, slips = WheelWatch(MODEL), []
+    watch, slips = SlipDetector(MODEL), []
     for tick, speed_mps in enumerate(speeds_mps.tolist()):
-        watch.update(step_s if tick else 0.0, OdometerReading(speed_mps, 0.0))
+        watch.update(step_s if tick else 0.0, WheelSpeed(speed_mps, 0.0))
         slips.append(float(watch.slip_mps[0]))
     return watch, slips
 
@@ -73,24 +73,24 @@ def test_the_coefficient_of_the_scale_does_not_follow_noise() -> None:
     watch, _ = watched(np.full(20, 20.0))
     seen = set()
     for _ in range(300):
-        watch.update(0.1, OdometerReading(20.0 + 0.05 * float(rng.standard_normal()), 0.0))
+        watch.update(0.1, WheelSpeed(20.0 + 0.05 * float(rng.standard_normal()), 0.0))
         seen.add(float(watch.steady_mps[0]))
     assert seen == {20.0}
     for speed_mps in np.arange(20.0, 10.0, -0.1).tolist():
-        watch.update(0.1, OdometerReading(speed_mps, 0.0))
+        watch.update(0.1, WheelSpeed(speed_mps, 0.0))
         assert abs(watch.steady_mps[0] - speed_mps) < 1.0
 
 
 def test_runs_without_a_reading_keep_what_they_have() -> None:
-    watch = WheelWatch(MODEL, (2,))
+    watch = SlipDetector(MODEL, (2,))
     both = np.array([[True], [True]])
     for tick in range(30):
         speed = np.full((2, 1), 20.0 + 0.06 * tick)
-        watch.update(0.1, OdometerReading(speed, np.zeros((2, 1)), both))
+        watch.update(0.1, WheelSpeed(speed, np.zeros((2, 1)), both))
     one = np.array([[True], [False]])
     for _ in range(100):
         speed = np.array([[21.8], [0.0]])
-        watch.update(0.1, OdometerReading(speed, np.zeros((2, 1)), one))
+        watch.update(0.1, WheelSpeed(speed, np.zeros((2, 1)), one))
     watch.update(0.1, None)
     assert watch.slip_mps[0, 0] == pytest.approx(coasting(21.8))
     assert watch.slip_mps[1, 0] < slipping(1.0)

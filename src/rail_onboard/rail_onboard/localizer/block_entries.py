@@ -7,7 +7,7 @@ from math import isfinite
 
 
 class BlockEntries:
-    """Tells joints passed from the carriers that the receiver holds on to.
+    """Finds the joints passed from the carriers that the receiver holds on to.
 
     Parameters
     ----------
@@ -32,15 +32,21 @@ class BlockEntries:
             raise ValueError(f"joints_m: {len(joints_m)} for {len(carriers_hz)} carriers")
         self._joints = list(zip(joints_m, carriers_hz, strict=True))
         self._within_m = within_m
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the carrier, as when switched on: the next is that of where the train is."""
         self._carrier_hz = 0.0
 
     def entered(self, carrier_hz: float, believed_m: float) -> float | None:
         """Chainage of the joint just passed, None if none was.
 
-        Two joints that fit tell nothing: a wrong one would be worse.
+        Two joints that fit say nothing: a wrong one would be worse. No carrier, and one that is not
+        a number, breaks the comparison: the next one may be that of the same block.
         """
-        before, self._carrier_hz = self._carrier_hz, carrier_hz
-        if not carrier_hz > 0.0 or carrier_hz == before or before == 0.0:
+        heard = isfinite(carrier_hz) and carrier_hz > 0.0
+        before, self._carrier_hz = self._carrier_hz, carrier_hz if heard else 0.0
+        if not heard or carrier_hz == before or before == 0.0:
             return None
         if not isfinite(believed_m):
             return None

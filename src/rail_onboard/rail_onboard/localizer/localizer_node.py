@@ -8,10 +8,10 @@ Topics in, as far as there are any: ``/<train>/odometer``, ``/<train>/doppler/fi
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
-from typing import Any
+from math import copysign, inf, isfinite, isnan, nan
+from typing import Any, Final
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -24,21 +24,23 @@ from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.position import figures_from_cdr as position_from_cdr
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import TableWriter, figures_from_cdr
+from rail_msgs_py.table import TableWriter
+from rail_msgs_py.table import figures_from_cdr as table_from_cdr
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
 from rail_msgs_py.topics.localizer import LOCALIZER_POSITION, LOCALIZER_STATE, TOLD_POSITION
 from rail_msgs_py.topics.ranging import POSITION
 from rail_msgs_py.topics.track_code import CODE_RECEIVED
 from rail_msgs_py.topics.world import ODOMETER
-from rail_signals.localizer.core import LocalizerCore
-from rail_signals.localizer.protection_level import Estimate, Reason, Status
+from rail_signals.localizer.localizer import Localizer
+from rail_signals.localizer.protection_level import Localization, Reason, Status
 from rail_signals.localizer.readings import (
-    BlockReading,
-    DopplerReading,
-    OdometerReading,
-    RangeReading,
+    BlockEntry,
+    DopplerFix,
+    RangeFix,
     TickReadings,
+    WheelSpeed,
 )
+from rail_signals.localizer.screening import Rejected
 from rail_signals.localizer.settings import (
     BlockModel,
     DopplerModel,
@@ -46,12 +48,14 @@ from rail_signals.localizer.settings import (
     LocalizerSettings,
     OdometerModel,
     RangeModel,
-    Sensor,
 )
 
 from .block_entries import BlockEntries
 
-_ODOMETER, _DOPPLER, _TOLD, _RANGED, _CODES = "odometer", "doppler", "told", "ranged", "codes"
+#: Ports of the inbox.
+_ODOMETER, _DOPPLER, _RELAYED, _RANGED, _CODES = (
+    *("odometer", "doppler", "relayed", "ranged", "codes"),
+)
 
 
 @dataclass(frozen=True)
@@ -130,20 +134,21 @@ class LocalizerNode(Equipment):
         super().__init__(name, namespace, context=context, parameters=parameters, services=services)
         self._p = p = declare(self, LocalizerParameters)
         self._train = train = namespace.strip("/")
+        self._localizer = Localizer(settings_of(p))
         try:
             self._entries = BlockEntries(p.joints_m, p.joint_carriers_hz)
         except ValueError as error:
             raise ParameterError(f"localizer: {error}") from None
-        self._start_over()
+        self._in_service, self._believed_m = False, p.start_m
         owners: dict[str, str] = {}
         self.stream_in(ODOMETER, self._on_odometer, train=train)
         if p.doppler:
             owners[_DOPPLER] = DOPPLER_FIX.owner(train=train)
             self._take(DOPPLER_FIX, _DOPPLER, len(DOPPLER_FIX.columns))
         if p.told:
-            owners[_TOLD] = TOLD_POSITION.owner(train=train)
+            owners[_RELAYED] = TOLD_POSITION.owner(train=train)
             self._take(
-                TOLD_POSITION, _TOLD, len(TOLD_POSITION.columns), round(p.tick_s * NANOSECONDS)
+                TOLD_POSITION, _RELAYED, len(TOLD_POSITION.columns), round(p.tick_s * NANOSECONDS)
             )
         if p.ranged:
             owners[_RANGED] = POSITION.owner(train=train).rpartition("/")[0]
@@ -153,10 +158,10 @@ class LocalizerNode(Equipment):
             self._take(CODE_RECEIVED, _CODES, len(CODE_RECEIVED.columns))
         self._inbox: TickInbox[Any] = TickInbox([_ODOMETER, *owners])
         if p.told:
-            # What is told in the first tick nobody can have received before it.
-            self._inbox.put(0, _TOLD, None)
+            # What is relayed in the first tick nobody can have received before it.
+            self._inbox.put(0, _RELAYED, None)
         self._watch = TickWatch(self, self._inbox, owners, p.timeout_s, self._advance)
-        self._tell = (
+        self._state = (
             self.stream_out(LOCALIZER_STATE, train=train)
             if p.told or p.joints_m  # train protection or code supervision waits for it
             else (self.publisher(LOCALIZER_STATE, train=train).publish)
@@ -167,34 +172,31 @@ class LocalizerNode(Equipment):
         self.announce_when_connected()
 
     def on_activate(self, state: Any) -> Any:
-        """Switched on again, it knows nothing of what was before."""
-        self._start_over()
+        """Switched on again, it knows nothing of what was before: not even where it started."""
+        self._localizer.reset()
+        self._entries.reset()
+        self._believed_m = nan
         return super().on_activate(state)
-
-    def _start_over(self) -> None:
-        self._core = LocalizerCore(settings_of(self._p))
-        self._last_ns: int | None = None
-        self._believed_m = self._p.start_m
 
     def _take(self, topic: Any, port: str, columns: int, late_ns: int = 0) -> None:
         """Listen to a table of one row; `late_ns` is added to its stamp."""
 
         def put(raw: bytes) -> None:
-            stamp_ns, figures = figures_from_cdr(raw, 1, columns)
-            self._inbox.put(stamp_ns + late_ns, port, figures[0].tolist())
+            stamp_ns, values = table_from_cdr(raw, 1, columns)
+            self._inbox.put(stamp_ns + late_ns, port, values[0].tolist())
             self._advance()
 
         self.stream_in(topic, put, train=self._train)
 
     def _on_odometer(self, raw: bytes) -> None:
-        stamp_ns, figures = figures_from_cdr(raw, 1, len(ODOMETER.columns))
-        self._inbox.put(stamp_ns, _ODOMETER, figures[0].tolist())
+        stamp_ns, values = table_from_cdr(raw, 1, len(ODOMETER.columns))
+        self._inbox.put(stamp_ns, _ODOMETER, values[0].tolist())
         self._watch.begin()
         self._advance()
 
     def _on_position(self, raw: bytes) -> None:
-        stamp_ns, track, figures = position_from_cdr(raw)
-        self._inbox.put(stamp_ns, _RANGED, figures if track == self._p.track else None)
+        stamp_ns, track, values = position_from_cdr(raw)
+        self._inbox.put(stamp_ns, _RANGED, values if track == self._p.track else None)
         self._advance()
 
     def _advance(self) -> None:
@@ -203,117 +205,128 @@ class LocalizerNode(Equipment):
             self._locate(*self._inbox.take())
 
     def _locate(self, stamp_ns: int, items: Mapping[str, Any]) -> None:
-        figures = np.array([[0.0, 0.0, 0.0, 0.0, np.nan, -inf, inf, np.nan, -inf, inf, inf]])
+        # The place where it is put into service is that of the first tick and of no later one.
+        starting, self._in_service = not self._in_service, True
+        columns: tuple[float, ...] = _UNKNOWN
         trouble = "switched off"
         if self.switched_on:
-            estimate = self._estimate(stamp_ns, items)
-            figures, trouble = _row(estimate), _trouble(estimate)
-        front_m, speed_mps, sigma_m = figures[0, [4, 7, 10]].tolist()
-        if isfinite(front_m):
-            self._believed_m = front_m
-        self._tell(self._table.write(stamp_ns, figures))
+            if starting:
+                self._localizer.place(self._p.start_m, self._p.placed_m)
+                self._believed_m = self._p.start_m
+            here = Localization.of(
+                self._localizer.tick(stamp_ns / NANOSECONDS, self._readings(stamp_ns, items))
+            )
+            columns, trouble = _columns(here), _trouble(here)
+            rejected = _words(self._localizer.rejected)
+            level = DiagnosticStatus.WARN if rejected else DiagnosticStatus.OK
+            self.report(level, "readings", rejected or "accepted", stamp_ns=stamp_ns)
+        self._publish(stamp_ns, columns)
+        level = DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK
+        self.report(level, "position", trouble or "protected", stamp_ns=stamp_ns)
+
+    def _publish(self, stamp_ns: int, columns: tuple[float, ...]) -> None:
+        state = dict(zip(LOCALIZER_STATE.columns, columns, strict=True))
+        front_m = state["front_m"]
         known = isfinite(front_m)
+        if known:
+            self._believed_m = front_m
+        self._state(self._table.write(stamp_ns, np.array([columns])))
+        last_m = self._believed_m if isfinite(self._believed_m) else self._p.start_m
         place = Position(
             stamp_ns,
             self._train,
             self._p.track,
-            front_m if known else self._believed_m,
-            sigma_m**2 if known else inf,
-            speed_mps if known else 0.0,
+            front_m if known else last_m,
+            state["sigma_m"] ** 2 if known else inf,
+            state["speed_mps"] if known else 0.0,
             0.0 if known else inf,
         )
         self._position(self._writer.write(place))
-        level = DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK
-        self.report(level, "position", trouble or "protected", stamp_ns=stamp_ns)
 
-    def _estimate(self, stamp_ns: int, items: Mapping[str, Any]) -> Estimate:
-        step_s = 0.0
-        if self._last_ns is None:
-            self._core.place(self._p.start_m, self._p.placed_m)
-        else:
-            step_s = (stamp_ns - self._last_ns) / NANOSECONDS
-        self._last_ns = stamp_ns
-        return self._core.step(
-            step_s,
-            TickReadings(
-                range=self._range_of(stamp_ns, items),
-                doppler=_doppler_of(items.get(_DOPPLER)),
-                block=self._block_of(items.get(_CODES)),
-                odometer=_odometer_of(items.get(_ODOMETER)),
-            ),
+    def _readings(self, stamp_ns: int, items: Mapping[str, Any]) -> TickReadings:
+        return TickReadings(
+            range=self._range_of(stamp_ns, items),
+            doppler=_doppler_of(items.get(_DOPPLER)),
+            block=self._block_of(items.get(_CODES)),
+            odometer=_odometer_of(items.get(_ODOMETER)),
         )
 
-    def _range_of(self, stamp_ns: int, items: Mapping[str, Any]) -> RangeReading | None:
-        told, shared = items.get(_TOLD), items.get(_RANGED)
-        if told is not None:
-            time_s, position_m, half_m = told
+    def _range_of(self, stamp_ns: int, items: Mapping[str, Any]) -> RangeFix | None:
+        """Range relayed by radio or shared by the wayside, None where they say there is none."""
+        relayed, shared = items.get(_RELAYED), items.get(_RANGED)
+        if relayed is not None:
+            time_s, position_m, half_m = relayed
+            if isnan(time_s) and isnan(position_m):
+                return None
             age_s = stamp_ns / NANOSECONDS - time_s
-            variance_m2 = (half_m / self._p.told_sigmas) ** 2
+            # The square must not hide a sign that is wrong.
+            variance_m2 = copysign((half_m / self._p.told_sigmas) ** 2, half_m)
         elif shared is not None:
             position_m, variance_m2, _, _ = shared
+            if variance_m2 == inf:
+                return None
             age_s = 0.0
         else:
             return None
-        if not (isfinite(position_m) and 0.0 < variance_m2 < inf):
-            return None
-        if not 0.0 <= age_s <= self._p.oldest_s:
-            return None
         station = bisect_right(self._p.zone_starts_m, position_m)
-        return RangeReading(position_m, variance_m2, age_s, float(station))
+        return RangeFix(position_m, variance_m2, age_s, float(station))
 
-    def _block_of(self, code: list[float] | None) -> BlockReading | None:
+    def _block_of(self, code: list[float] | None) -> BlockEntry | None:
         if code is None:
             return None
         joint_m = self._entries.entered(code[CODE_RECEIVED.index["carrier_hz"]], self._believed_m)
-        return None if joint_m is None else BlockReading(joint_m, 0.0)
+        return None if joint_m is None else BlockEntry(joint_m, 0.0)
 
 
-def _doppler_of(fix: list[float] | None) -> DopplerReading | None:
-    """A fix as the filter takes it, None if it is not one."""
-    if fix is None or fix[DOPPLER_FIX.index["reason"]] != 0.0:
+def _doppler_of(row: list[float] | None) -> DopplerFix | None:
+    """A fix of the positioner, None where it says that there is none."""
+    if row is None or row[DOPPLER_FIX.index["reason"]] != 0.0:
         return None
-    chainage_m, speed_mps, variance, covariance, speed_variance = fix[1:6]
-    return DopplerReading(chainage_m, speed_mps, variance, covariance, speed_variance, 0.0)
+    chainage_m, speed_mps, variance, covariance, speed_variance = row[1:6]
+    return DopplerFix(chainage_m, speed_mps, variance, covariance, speed_variance, 0.0)
 
 
-def _odometer_of(reading: list[float] | None) -> OdometerReading | None:
-    return None if reading is None else OdometerReading(abs(reading[1]), 0.0)
+def _odometer_of(row: list[float] | None) -> WheelSpeed | None:
+    return None if row is None else WheelSpeed(abs(row[ODOMETER.index["speed_mps"]]), 0.0)
 
 
-def _row(estimate: Estimate) -> np.ndarray[Any, Any]:
-    """Figures [1, column] as ``LOCALIZER_STATE.columns``."""
-    excluded = sum(1 << int(sensor) for sensor in Sensor if bool(estimate.excluded[..., sensor]))
-    return np.array(
-        [
-            [
-                float(estimate.status),
-                float(estimate.reason),
-                float(estimate.found),
-                float(excluded),
-                float(estimate.position_m),
-                float(estimate.low_m),
-                float(estimate.high_m),
-                float(estimate.speed_mps),
-                float(estimate.speed_low_mps),
-                float(estimate.speed_high_mps),
-                float(estimate.sigma_m),
-            ]
-        ]
+#: Of what is published where nothing is known, as `LOCALIZER_STATE.columns`.
+_UNKNOWN: Final = (0.0, 0.0, 0.0, 0.0, nan, -inf, inf, nan, -inf, inf, inf)
+
+
+def _columns(here: Localization) -> tuple[float, ...]:
+    """Values of a state, as `LOCALIZER_STATE.columns`."""
+    return (
+        float(here.status),
+        float(here.reason),
+        float(here.found),
+        float(sum(1 << sensor for sensor in here.excluded)),
+        here.position_m,
+        here.low_m,
+        here.high_m,
+        here.speed_mps,
+        here.speed_low_mps,
+        here.speed_high_mps,
+        here.sigma_m,
     )
 
 
-def _trouble(estimate: Estimate) -> str:
+def _trouble(here: Localization) -> str:
     """What is wrong, in words; empty if nothing is."""
-    excluded = [sensor.name.lower() for sensor in Sensor if bool(estimate.excluded[..., sensor])]
+    excluded = [sensor.name.lower() for sensor in sorted(here.excluded)]
     parts = [f"without {', '.join(excluded)}"] if excluded else []
-    if int(estimate.status) == Status.UNAVAILABLE:
+    if here.status is Status.UNAVAILABLE:
         parts.append("not known")
-    elif bool(estimate.found) and not excluded:
+        if here.reason is not Reason.NONE:
+            parts.append(here.reason.name.lower().replace("_", " "))
+    elif here.found and not excluded:
         parts.append("a sensor is faulty")
-    reason = Reason(int(estimate.reason))
-    if int(estimate.status) == Status.UNAVAILABLE and reason is not Reason.NONE:
-        parts.append(reason.name.lower().replace("_", " "))
     return ": ".join(parts)
+
+
+def _words(rejected: Sequence[Rejected]) -> str:
+    """Which sensors gave no evidence, and why."""
+    return "; ".join(f"{sensor.name.lower()}: {why.value}" for sensor, why, _ in rejected)
 
 
 def main() -> None:

@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
+from typing import Final
 
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 
+_COLUMNS: Final = tuple(
+    LOCALIZER_STATE.index[name]
+    for name in ("low_m", "high_m", "speed_mps", "speed_low_mps", "speed_high_mps")
+)
+
 
 @dataclass(frozen=True)
-class Located:
+class LocatedFront:
     """Chainages between which the front is [m], and speeds [m/s].
 
     ``doubt_mps`` is by how much the fastest is above the speed that is believed.
@@ -32,30 +38,22 @@ class Located:
         return 0.5 * (self.high_m - self.low_m)
 
     def travelled(self, direction: int) -> tuple[float, float]:
-        """Least and most of the way that grows with the travel [m]; `direction` 1 or -1."""
+        """Least and most of the chainage that grows with the travel [m]; `direction` 1 or -1."""
         return (self.low_m, self.high_m) if direction > 0 else (-self.high_m, -self.low_m)
 
 
-def located(figures: Sequence[float] | None) -> Located | None:
-    """What a row of a localizer says; None if it does not know.
+def located(row: Sequence[float] | None) -> LocatedFront | None:
+    """What a row of a localizer says; None if it does not know, or not all.
 
     Parameters
     ----------
-    figures : float [column], or None
+    row : float [column], or None
         Columns as `LOCALIZER_STATE.columns`.
     """
-    if figures is None:
+    if row is None:
         return None
-    low_m, high_m = (
-        figures[LOCALIZER_STATE.index["low_m"]],
-        figures[LOCALIZER_STATE.index["high_m"]],
-    )
-    if not (isfinite(low_m) and isfinite(high_m)):
+    low_m, high_m, speed_mps, slowest_mps, fastest_mps = (row[at] for at in _COLUMNS)
+    if not all(map(isfinite, (low_m, high_m, speed_mps, slowest_mps, fastest_mps))):
         return None
-    bounds = (
-        figures[LOCALIZER_STATE.index["speed_low_mps"]],
-        figures[LOCALIZER_STATE.index["speed_high_mps"]],
-    )
-    fastest_mps = max(abs(bound) for bound in bounds)
-    doubt_mps = max(0.0, fastest_mps - abs(figures[LOCALIZER_STATE.index["speed_mps"]]))
-    return Located(low_m, high_m, fastest_mps, doubt_mps)
+    most_mps = max(abs(slowest_mps), abs(fastest_mps))
+    return LocatedFront(low_m, high_m, most_mps, max(0.0, most_mps - abs(speed_mps)))

@@ -35,9 +35,9 @@ from .settings import LocalizerSettings, MotionModel, Sensor
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
-Figure: TypeAlias = float | FloatArray
+Values: TypeAlias = float | FloatArray
 #: A row of the measurement matrix: states and their coefficients; None is one.
-Row: TypeAlias = Sequence[tuple[int, Figure | None]]
+MeasurementRow: TypeAlias = Sequence[tuple[int, Values | None]]
 
 STATES: Final = 7
 S, V, A, SCALE, SLIP, RANGE_BIAS, DOPPLER_BIAS = range(STATES)
@@ -71,6 +71,10 @@ class Outcome(NamedTuple):
     refused: BoolArray | None
     innovation: FloatArray
     variance: FloatArray
+
+
+Outcomes: TypeAlias = tuple[Outcome, ...]
+"""Of a reading, one for each of its scalars."""
 
 
 @lru_cache(maxsize=16)
@@ -108,7 +112,7 @@ def singer(step_s: float, motion: MotionModel) -> tuple[FloatArray, FloatArray]:
     return transition, added
 
 
-def combine(row: Row, by_state: FloatArray) -> FloatArray:
+def combine(row: MeasurementRow, by_state: FloatArray) -> FloatArray:
     """Sum of what belongs to the states of a row, times its coefficients.
 
     Examples
@@ -169,7 +173,7 @@ class FilterBank:
         times_s = np.full(STATES, np.inf)
         times_s[A], times_s[SLIP] = motion.correlation_s, wheels.correlation_s
         column = (STATES, *(1 for _ in shape), 1)
-        # Decay of every state with the way and with time, and the variances they settle at.
+        # Decay of every state with the distance run and with time, and what variances settle at.
         self._per_m, self._per_s = -1.0 / lengths_m.reshape(column), -1.0 / times_s.reshape(column)
         self._settled = np.empty((STATES, *shape, 1))
         self._settled[...] = settled.reshape(column)
@@ -193,7 +197,7 @@ class FilterBank:
     def place(
         self,
         which: BoolArray,
-        chainage_m: Figure,
+        chainage_m: Values,
         sigma_m: float,
         speed_mps: float,
         sigma_mps: float,
@@ -206,7 +210,7 @@ class FilterBank:
         self.variances[S][which], self.variances[V][which] = sigma_m**2, sigma_mps**2
         self.known |= which
 
-    def predict(self, step_s: float, slip_mps: Figure, new_station: bool | BoolArray) -> None:
+    def predict(self, step_s: float, slip_mps: Values, new_station: bool | BoolArray) -> None:
         """Let time pass.
 
         Parameters
@@ -242,12 +246,14 @@ class FilterBank:
         decay *= decay
         self.variances += self._settled * (1.0 - decay)
 
-    def take(self, row: Row, reading: Figure, variance: Figure, use: BoolArray) -> Outcome:
+    def take(
+        self, row: MeasurementRow, reading: Values, variance: Values, use: BoolArray
+    ) -> Outcome:
         """Take a scalar reading ``reading = row x + noise``.
 
         Parameters
         ----------
-        row : Row
+        row : MeasurementRow
             Coefficients, each a float or float64 [..., 1 or filter].
         reading, variance : float or float64 [..., 1 or filter]
             The reading, finite even where it is not used, and the variance of its noise.
@@ -269,7 +275,7 @@ class FilterBank:
         self.p -= g[:, None] * g
         return Outcome(refused, innovation, total)
 
-    def start(self, chainage_m: Figure, use: BoolArray) -> None:
+    def start(self, chainage_m: Values, use: BoolArray) -> None:
         """Let filters that know no position begin about a fix, to be taken right after."""
         if self._all_known:
             return

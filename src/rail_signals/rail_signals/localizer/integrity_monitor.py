@@ -1,7 +1,7 @@
-"""Which faults are still possible, which sensors are left out, and the interval that remains.
+"""Fault detection and exclusion: which faults are still possible, which sensors are left out.
 
 **Hypotheses.** H0: no sensor is faulty; Hi: sensor i is, and no other. Under Hi the filter without
-sensor i is right, whatever sensor i told, so the train is within ``K sigma`` of it but for the
+sensor i is right, whatever sensor i reported, so the train is within ``K sigma`` of it but for the
 risk. Whichever of the hypotheses is true, it is then in the *hull* of their intervals, before any
 fault is found and while it is not yet known which sensor has it. The hull uses the separation
 that is there, where the protection level of solution separation (Blanch et al., IEEE Trans.
@@ -19,14 +19,12 @@ bank goes on with the others. It is used again when it has agreed with them for 
 
 from __future__ import annotations
 
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 
-from .filter_bank import FILTERS, SCALE, USES, BoolArray, FilterBank, Outcome, V
+from .filter_bank import FILTERS, SCALE, USES, BoolArray, FilterBank, Outcomes, V
 from .settings import SENSORS, IntegrityClaim, Sensor
-
-Outcomes: TypeAlias = tuple[Outcome, ...]
 
 HYPOTHESES: Final = 1 + SENSORS
 """H0 and one for each sensor: the first filters of the bank."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import IntEnum
+from math import inf
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from .filter_bank import BoolArray, FilterBank, FloatArray, S, V
 from .integrity_monitor import HYPOTHESES, IntegrityMonitor
-from .settings import SENSORS, IntegrityClaim
+from .settings import SENSORS, IntegrityClaim, Sensor
 
 IntArray: TypeAlias = NDArray[np.int64]
 
@@ -84,7 +86,71 @@ class Estimate(NamedTuple):
         return np.where(np.isnan(level_m), np.inf, level_m)
 
 
-class ClaimMaker:
+@dataclass(frozen=True)
+class Localization:
+    """What is known of one train: an `Estimate` in plain types.
+
+    Parameters
+    ----------
+    position_m, low_m, high_m : float
+        Chainage and the interval that holds it; NaN and infinite if not available.
+    speed_mps, speed_low_mps, speed_high_mps : float
+        The same of the speed, positive with chainage.
+    sigma_m : float
+        Standard deviation of the position if no sensor is faulty.
+    status : Status
+    reason : Reason
+        Why the status is no better.
+    found : bool
+        Whether a sensor is known to be faulty.
+    excluded, uncovered : frozenset of Sensor
+        Sensors left out, and those whose fault the interval does not survive.
+    """
+
+    position_m: float
+    low_m: float
+    high_m: float
+    speed_mps: float
+    speed_low_mps: float
+    speed_high_mps: float
+    sigma_m: float
+    status: Status
+    reason: Reason
+    found: bool
+    excluded: frozenset[Sensor]
+    uncovered: frozenset[Sensor]
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> Localization:
+        """Of the estimate of a localizer of one train."""
+        return cls(
+            float(estimate.position_m),
+            float(estimate.low_m),
+            float(estimate.high_m),
+            float(estimate.speed_mps),
+            float(estimate.speed_low_mps),
+            float(estimate.speed_high_mps),
+            float(estimate.sigma_m),
+            Status(int(estimate.status)),
+            Reason(int(estimate.reason)),
+            bool(estimate.found),
+            _sensors(estimate.excluded.tolist()),
+            _sensors(estimate.uncovered.tolist()),
+        )
+
+    @property
+    def protection_m(self) -> float:
+        """Protection level: the train is within ``position_m`` ± this; infinite if unavailable."""
+        if self.status is Status.UNAVAILABLE:
+            return inf
+        return max(self.high_m - self.position_m, self.position_m - self.low_m)
+
+
+def _sensors(flags: list[bool]) -> frozenset[Sensor]:
+    return frozenset(sensor for sensor in Sensor if flags[sensor])
+
+
+class ProtectionLevels:
     """Turns the possible hypotheses into an interval.
 
     Parameters
@@ -128,12 +194,13 @@ class ClaimMaker:
         high = np.where(hull, high, -np.inf).max(axis=-1)
         with np.errstate(invalid="ignore"):
             middle = np.where(healthy, middle, 0.5 * (low + high))
-            wide = np.maximum(high - middle, middle - low)[S] > self._claim.widest_m
+            # Said so that NaN is too wide as well.
+            wide = ~(np.maximum(high - middle, middle - low)[S] <= self._claim.widest_m)
         uncovered = considered[..., 1:] & ~covered[..., 1:]
         some = uncovered.any(axis=-1)
         contrary = ~possible.any(axis=-1) | (excluded > 1) | ((excluded == 1) & ~healthy)
         reason = np.full(wide.shape, int(Reason.NONE))
-        # The last that applies is told.
+        # The last that applies is reported.
         for which, why in (
             (some, Reason.TOO_FEW_SENSORS),
             (wide | (healthy & ~covered[..., 0]), Reason.TOO_WIDE),

@@ -11,7 +11,7 @@ that the filters differ in nothing but the sensors they use.
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,76 +22,79 @@ from .filter_bank import (
     SLIP,
     A,
     BoolArray,
-    Figure,
     FilterBank,
-    Outcome,
-    Row,
+    MeasurementRow,
+    Outcomes,
     S,
     V,
+    Values,
 )
 from .settings import SENSORS, LocalizerSettings
 
-Outcomes: TypeAlias = tuple[Outcome, ...]
 
+class RangeFix(NamedTuple):
+    """Chainage by phase ranging.
 
-class RangeReading(NamedTuple):
-    """Chainage by phase ranging; each a float, or float64 [..., 1] for many runs.
-
-    ``station`` is any number that tells stations apart; ``present`` where there is a reading:
-    elsewhere the others are not looked at, but must be finite.
+    ``station`` is any number that tells apart the stations that measured. Here as in the other
+    readings every value is a float, or float64 [..., 1] for many runs; ``present`` is where there
+    is a reading: elsewhere the others are not looked at, but must be finite, variances above zero.
+    The age is the time since the reading was true.
     """
 
-    chainage_m: Figure
-    variance_m2: Figure
-    age_s: Figure
-    station: Figure
+    chainage_m: Values
+    variance_m2: Values
+    age_s: Values
+    station: Values = 0.0
     present: bool | BoolArray = True
 
 
-class DopplerReading(NamedTuple):
+class DopplerFix(NamedTuple):
     """Chainage and speed, positive with chainage, with their covariance [m^2, m^2/s, m^2/s^2]."""
 
-    chainage_m: Figure
-    speed_mps: Figure
-    variance_m2: Figure
-    covariance_m2ps: Figure
-    speed_variance_m2ps2: Figure
-    age_s: Figure
+    chainage_m: Values
+    speed_mps: Values
+    variance_m2: Values
+    covariance_m2ps: Values
+    speed_variance_m2ps2: Values
+    age_s: Values
     present: bool | BoolArray = True
 
 
-class BlockReading(NamedTuple):
+class BlockEntry(NamedTuple):
     """Chainage of the joint by which a new block was entered; the age is that of the notice."""
 
-    joint_m: Figure
-    age_s: Figure
+    joint_m: Values
+    age_s: Values
     present: bool | BoolArray = True
 
 
-class OdometerReading(NamedTuple):
-    """Speed of the wheels, counted up either way."""
+class WheelSpeed(NamedTuple):
+    """Speed of the wheels, positive in the direction of travel.
 
-    speed_mps: Figure
-    age_s: Figure
+    A distance counted over a tick, divided by the tick, is the speed in the middle of it.
+    """
+
+    speed_mps: Values
+    age_s: Values
     present: bool | BoolArray = True
 
 
 class TickReadings(NamedTuple):
     """What came in a tick; None where no run has any."""
 
-    range: RangeReading | None = None
-    doppler: DopplerReading | None = None
-    block: BlockReading | None = None
-    odometer: OdometerReading | None = None
+    range: RangeFix | None = None
+    doppler: DopplerFix | None = None
+    block: BlockEntry | None = None
+    odometer: WheelSpeed | None = None
 
 
-class Intake:
+class MeasurementModel:
     """Offers readings to the filters of a bank."""
 
     def __init__(self, settings: LocalizerSettings) -> None:
         self._settings = settings
 
-    def range(self, bank: FilterBank, reading: RangeReading, use: BoolArray) -> Outcomes:
+    def range(self, bank: FilterBank, reading: RangeFix, use: BoolArray) -> Outcomes:
         """``z = s + b + noise``."""
         model = self._settings.ranging
         bank.start(reading.chainage_m, use)
@@ -100,11 +103,11 @@ class Intake:
         row.append((RANGE_BIAS, None))
         return (bank.take(row, reading.chainage_m, noise + slack, use),)
 
-    def doppler(self, bank: FilterBank, reading: DopplerReading, use: BoolArray) -> Outcomes:
+    def doppler(self, bank: FilterBank, reading: DopplerFix, use: BoolArray) -> Outcomes:
         """``z = s + sigma d + noise`` and the speed less its regression on the position.
 
         The regression c = cov / var makes the noise of the two rows independent. An error that
-        lasts moves a fix along the axis on which noise does, so it has no share in the second row.
+        lasts moves a fix along the axis on which noise does, so it has no part in the second row.
         """
         model = self._settings.doppler
         bank.start(reading.chainage_m, use)
@@ -117,7 +120,7 @@ class Intake:
             [*place, (DOPPLER_BIAS, np.sqrt(variance))], reading.chainage_m, variance + slack, use
         )
         age_s = reading.age_s
-        row: Row = [
+        row: MeasurementRow = [
             (S, -regression),
             (V, 1.0 + regression * age_s),
             (A, -age_s * (1.0 + 0.5 * regression * age_s)),
@@ -128,7 +131,7 @@ class Intake:
             use = use & ~first.refused
         return first, bank.take(row, speed_mps, rest + slack, use)
 
-    def block(self, bank: FilterBank, reading: BlockReading, use: BoolArray) -> Outcomes:
+    def block(self, bank: FilterBank, reading: BlockEntry, use: BoolArray) -> Outcomes:
         """``joint = s - (age + T/2) v + noise``, T the longest delay of the detection.
 
         The noise goes with the speed: with the fastest of those that the filters of single faults
@@ -145,23 +148,23 @@ class Intake:
         return (bank.take(row, reading.joint_m, noise + slack, use),)
 
     def odometer(
-        self, bank: FilterBank, reading: OdometerReading, steady_mps: Figure, use: BoolArray
+        self, bank: FilterBank, reading: WheelSpeed, steady_mps: Values, use: BoolArray
     ) -> Outcomes:
         """``w = v + k w0 + u + noise``: linear, with a speed w0 that does not follow the noise."""
         model, age_s = self._settings.odometer, reading.age_s
         wheel_mps = self._settings.direction * reading.speed_mps
-        row: list[tuple[int, Figure | None]] = [
+        row: list[tuple[int, Values | None]] = [
             (V, None),
             (SCALE, self._settings.direction * steady_mps),
             (SLIP, None),
         ]
-        noise: Figure = model.noise_mps**2
+        noise: Values = model.noise_mps**2
         if not _is_zero(age_s):
             row.append((A, -age_s))
             noise = noise + np.square(self._settings.motion.step_mps2 * age_s)
         return (bank.take(row, wheel_mps, noise, use),)
 
-    def _place_row(self, age_s: Figure) -> tuple[list[tuple[int, Figure | None]], Figure]:
+    def _place_row(self, age_s: Values) -> tuple[list[tuple[int, Values | None]], Values]:
         if _is_zero(age_s):
             return [(S, None)], 0.0
         half_square = 0.5 * np.square(age_s)
@@ -169,5 +172,5 @@ class Intake:
         return [(S, None), (V, -age_s), (A, half_square)], slack
 
 
-def _is_zero(figure: Figure) -> bool:
-    return isinstance(figure, float) and figure == 0.0
+def _is_zero(values: Values) -> bool:
+    return isinstance(values, float) and values == 0.0

@@ -1,6 +1,6 @@
 """What the localizer assumes of a train's motion, of its sensors and of their faults.
 
-Every figure is an assumption that the protection level rests on; ``docs/localizer.md`` lists them.
+Every value is an assumption that the protection level rests on; ``docs/localizer.md`` lists them.
 Standard deviations are called sigma. An error that stays the same from reading to reading is kept
 apart from noise: noise averages out, a bias does not, and a filter that took one for the other
 would claim too much.
@@ -72,7 +72,7 @@ class RangeModel:
     bias_m : float
         Sigma of what stays the same: survey, calibration, multipath. New with every station.
     bias_length_m : float
-        Way over which it changes; standing still it does not.
+        Distance run over which it changes; standing still it does not.
     """
 
     least_sigma_m: float = 0.1
@@ -95,7 +95,7 @@ class DopplerModel:
         Sigma of the error that stays the same, over the sigma that a fix states: an error of
         frequency that lasts moves the fix along the same line as noise does.
     length_m : float
-        Way over which it changes.
+        Distance run over which it changes.
     """
 
     least_sigma_m: float = 0.3
@@ -129,19 +129,19 @@ class BlockModel:
 
 @dataclass(frozen=True)
 class OdometerModel:
-    """Errors of the speed that wheels tell: ``w = v + k w + u + noise``.
+    """Errors of the speed of the wheels: ``w = v + k w + u + noise``.
 
     Parameters
     ----------
     noise_mps : float
         Sigma of the noise of one reading.
     scale, scale_length_m : float
-        Sigma of k, the relative error by wear, and the way over which it changes.
+        Sigma of k, the relative error by wear, and the Distance run over which it changes.
     creep, effort_creep, slip : float
         Sigma of u over the speed when coasting, under traction or braking, and once the wheels
         have been seen to slip or slide.
     creep_mps, effort_creep_mps, slip_mps : float
-        Added to it: slowly turning wheels slip by more than a share of their speed.
+        Added to it: slowly turning wheels slip by more than a fraction of their speed.
     effort_mps2 : float
         A wheel that changes its speed faster than this pulls or brakes.
     limit_mps2 : float
@@ -185,7 +185,7 @@ class IntegrityClaim:
     false_alarms_per_hour : float
         Bound on how often healthy sensors are taken for contradictory.
     tick_s : float
-        From tick to tick, to share the alarms out.
+        From tick to tick, to divide the alarms among the ticks.
     widest_m : float
         A protection level above it is not given.
     hold_s : float
@@ -205,6 +205,8 @@ class IntegrityClaim:
         After so long in contradiction everything begins anew.
     oldest_s : float
         Age that a reading may have.
+    most_alike : int
+        So many ranges or Doppler fixes in a row with the same values are of a frozen sensor.
     """
 
     risk: float = 1e-5
@@ -219,6 +221,7 @@ class IntegrityClaim:
     unmonitored_s: float = 600.0
     restart_s: float = 60.0
     oldest_s: float = 1.0
+    most_alike: int = 5
 
     def __post_init__(self) -> None:
         _check(self, infinite=("unmonitored_s",))
@@ -226,6 +229,8 @@ class IntegrityClaim:
             counts = getattr(self, name)
             if len(counts) != SENSORS or min(counts) < 1:
                 raise ValueError(f"{name}: {counts} are not {SENSORS} counts from 1")
+        if not self.most_alike > 1:
+            raise ValueError(f"most_alike: {self.most_alike} is not a count from 2")
         if not (self.risk < 0.5 and self.false_alarms_per_tick < 0.5):
             raise ValueError(f"risk: {self.risk}, {self.false_alarms_per_hour} are too large")
 

@@ -1,9 +1,9 @@
-"""Effort and slip, told from the wheels' own speed.
+"""Effort and slip, detected from the wheels' own speed.
 
 A wheel speed less its mean over the last T seconds, with exponential weights, is T times a steady
 acceleration (for ticks of length t, ``t / (1 - exp(-t / T))`` times). Wheels that pull or brake
 creep; wheels that change their speed faster than any train can, slip or slide. How much is reckoned
-with goes by the speed that the train may still have: wheels that slide tell too little of it, and
+with goes by the speed that the train may still have: wheels that slide turn too slowly for it, and
 it falls no faster than a train can brake.
 """
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from .filter_bank import FloatArray
-from .readings import OdometerReading
+from .readings import WheelSpeed
 from .settings import OdometerModel
 
 #: Over which the mean is taken: for effort, and for slip, which is faster and more [s].
@@ -21,7 +21,7 @@ _MEANS_S = (1.0, 0.3)
 _STEADY_MPS = 0.3
 
 
-class WheelWatch:
+class SlipDetector:
     """Keeps the sigma of the slip to be reckoned with.
 
     Parameters
@@ -54,11 +54,11 @@ class WheelWatch:
 
         The coefficient of the scale. Were it the latest speed, or a mean of the last ones, its
         noise would be in the gain of the scale while that of the same readings is in the
-        innovation: the mean of their product drives the scale away, though wheels alone tell
+        innovation: the mean of their product drives the scale away, though wheels alone say
         nothing about it. Two percent of a scale of two percent are no loss.
         """
 
-    def update(self, step_s: float, reading: OdometerReading | None) -> None:
+    def update(self, step_s: float, reading: WheelSpeed | None) -> None:
         """Take the reading of a tick, or none, `step_s` after that of the one before."""
         model = self._model
         if reading is None:

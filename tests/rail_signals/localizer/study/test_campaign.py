@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rail_signals.localizer.core import LocalizerCore
+from rail_signals.localizer.localizer import Localizer
 from rail_signals.localizer.protection_level import Reason
 from rail_signals.localizer.readings import TickReadings
 from rail_signals.localizer.settings import IntegrityClaim, LocalizerSettings, Sensor
 from rail_signals.localizer.study.campaign import Tally, stated_s, tally
-from rail_signals.localizer.study.faults import CASES, EFFECT, Kind, SensorFault
+from rail_signals.localizer.study.faults import CASES, EFFECT, FaultKind, SensorFault
 from rail_signals.localizer.study.simulation import (
     Drifting,
     SimulatedLine,
@@ -27,7 +27,7 @@ DEFAULT = LocalizerSettings()
 
 def cell(
     sensor: Sensor | None,
-    kind: Kind | None,
+    kind: FaultKind | None,
     settings: LocalizerSettings = DEFAULT,
     *,
     runs: int = 60,
@@ -48,7 +48,7 @@ def healthy() -> Tally:
 
 def test_without_a_fault_the_protection_level_holds_and_nothing_is_found(healthy: Tally) -> None:
     assert healthy.positions == 40_000
-    assert healthy.exceeded == healthy.speed_exceeded == 0
+    assert healthy.misleading == healthy.misleading_speeds == 0
     assert healthy.false_alarms == healthy.wrong_exclusions == 0
     assert healthy.claimed > 0.99 * healthy.positions
     assert sum(healthy.reasons) == healthy.positions
@@ -61,19 +61,19 @@ def test_without_a_fault_the_protection_level_holds_and_nothing_is_found(healthy
 @pytest.mark.parametrize(
     ("sensor", "kind"),
     [
-        (Sensor.RANGE, Kind.BIAS),
-        (Sensor.RANGE, Kind.WRONG_STATION),
-        (Sensor.DOPPLER, Kind.JUMP),
-        (Sensor.ODOMETER, Kind.FREEZE),
+        (Sensor.RANGE, FaultKind.BIAS),
+        (Sensor.RANGE, FaultKind.WRONG_STATION),
+        (Sensor.DOPPLER, FaultKind.JUMP),
+        (Sensor.ODOMETER, FaultKind.FREEZE),
     ],
 )
 def test_with_a_faulty_sensor_it_holds_too_and_the_fault_is_found(
-    sensor: Sensor, kind: Kind
+    sensor: Sensor, kind: FaultKind
 ) -> None:
     counted = cell(sensor, kind, runs=25)
     assert counted.positions > 7_000
-    assert counted.exceeded <= 1e-4 * counted.claimed
-    assert counted.speed_exceeded <= 1e-4 * counted.claimed
+    assert counted.misleading <= 1e-4 * counted.claimed
+    assert counted.misleading_speeds <= 1e-4 * counted.claimed
     assert counted.wrong_exclusions == counted.false_alarms == 0
     assert counted.claimed > 0.9 * counted.positions
     assert counted.due > 0
@@ -84,9 +84,9 @@ def test_with_a_faulty_sensor_it_holds_too_and_the_fault_is_found(
 def test_a_larger_risk_gives_narrower_levels_and_is_kept() -> None:
     """Where there is something to count: a range that jumps, and one position in twenty."""
     risky = replace(DEFAULT, claim=replace(DEFAULT.claim, risk=0.05))
-    counted = cell(Sensor.RANGE, Kind.JUMP, risky, runs=40)
-    assert 0.0 < counted.exceeded <= 0.05 * counted.claimed
-    usual = cell(Sensor.RANGE, Kind.JUMP, runs=20, ticks=200)
+    counted = cell(Sensor.RANGE, FaultKind.JUMP, risky, runs=40)
+    assert 0.0 < counted.misleading <= 0.05 * counted.claimed
+    usual = cell(Sensor.RANGE, FaultKind.JUMP, runs=20, ticks=200)
     assert counted.protection_m.mean() < 0.8 * usual.protection_m.mean()
 
 
@@ -97,18 +97,18 @@ def test_false_alarms_are_no_more_than_stated() -> None:
     runs, ticks, rng = 60, 200, np.random.default_rng(4)
     motion = SimulatedMotion(runs, 1, LINE.tick_s, rng)
     sensors = SimulatedSensors(LINE, runs, 1, rng)
-    core = LocalizerCore(replace(DEFAULT, claim=claim), (runs,))
+    localizer = Localizer(replace(DEFAULT, claim=claim), (runs,))
     alarms = positions = 0
     before = np.zeros(runs, np.bool_)
     for tick in range(ticks):
         truth = motion.step()
         readings = sensors.read(truth)
         if tick == 0:
-            core.place(truth.chainage_m[:, None], 2.0, sigma_mps=30.0)
-        told = core.step(LINE.tick_s if tick else 0.0, readings)
-        alarms += int((told.found & ~before).sum())
-        positions += int((~told.found | ~before).sum())
-        before = told.found
+            localizer.place(truth.chainage_m[:, None], 2.0, sigma_mps=30.0)
+        estimate = localizer.tick(tick * LINE.tick_s, readings)
+        alarms += int((estimate.found & ~before).sum())
+        positions += int((~estimate.found | ~before).sum())
+        before = estimate.found
     assert 0 < alarms <= 0.01 * positions
 
 
@@ -116,13 +116,13 @@ def one_run(readings: TickReadings, run: int) -> TickReadings:
     """Return the readings of one of many runs as a single train has them."""
     parts = []
     for reading in readings:
-        figures = {
+        values = {
             key: value[run, 0].item() if key != "present" else None
             for key, value in reading._asdict().items()
         }
         present = bool(reading.present[run, 0])
-        figures["present"] = True
-        parts.append(reading._replace(**figures) if present else None)
+        values["present"] = True
+        parts.append(reading._replace(**values) if present else None)
     return TickReadings(*parts)
 
 
@@ -130,30 +130,29 @@ def test_many_runs_at_once_are_as_one_by_one() -> None:
     runs, rng = 4, np.random.default_rng(9)
     motion = SimulatedMotion(runs, -1, LINE.tick_s, rng)
     sensors = SimulatedSensors(LINE, runs, -1, rng)
-    fault = SensorFault(Sensor.RANGE, Kind.JUMP, np.array([5.0, 6.0, 7.0, 1e9]), LINE, rng)
+    fault = SensorFault(Sensor.RANGE, FaultKind.JUMP, np.array([5.0, 6.0, 7.0, 1e9]), LINE, rng)
     settings = LocalizerSettings(direction=-1)
-    together = LocalizerCore(settings, (runs,))
-    alone = [LocalizerCore(settings) for _ in range(runs)]
+    together = Localizer(settings, (runs,))
+    alone = [Localizer(settings) for _ in range(runs)]
     for tick in range(100):
         truth = motion.step()
         readings, _, _ = fault.apply(sensors.read(truth), tick * LINE.tick_s)
         if tick == 0:
             together.place(truth.chainage_m[:, None], 2.0, sigma_mps=30.0)
-            for run, core in enumerate(alone):
-                core.place(float(truth.chainage_m[run]), 2.0, sigma_mps=30.0)
-        step_s = LINE.tick_s if tick else 0.0
-        told = together.step(step_s, readings)
-        for run, core in enumerate(alone):
-            single = core.step(step_s, one_run(readings, run))
+            for run, localizer in enumerate(alone):
+                localizer.place(float(truth.chainage_m[run]), 2.0, sigma_mps=30.0)
+        estimate = together.tick(tick * LINE.tick_s, readings)
+        for run, localizer in enumerate(alone):
+            single = localizer.tick(tick * LINE.tick_s, one_run(readings, run))
             for name, value in single._asdict().items():
-                batched = getattr(told, name)[run]
+                batched = getattr(estimate, name)[run]
                 np.testing.assert_allclose(batched, value, rtol=1e-9, atol=1e-9, err_msg=name)
-    assert told.excluded[:3, Sensor.RANGE].all()
-    assert not told.excluded[3].any()
+    assert estimate.excluded[:3, Sensor.RANGE].all()
+    assert not estimate.excluded[3].any()
 
 
 def test_the_same_seed_gives_the_same_counts() -> None:
-    one, other = (cell(Sensor.DOPPLER, Kind.BIAS, runs=5, ticks=150) for _ in range(2))
+    one, other = (cell(Sensor.DOPPLER, FaultKind.BIAS, runs=5, ticks=150) for _ in range(2))
     np.testing.assert_array_equal(one.protection_m, other.protection_m)
     assert one.reasons == other.reasons
 
@@ -168,11 +167,11 @@ def test_block_entries_are_told_late_by_a_uniform_time(direction: int) -> None:
     for tick in range(400):
         at_m = direction * (10e3 + tick * line.tick_s * speed_mps + np.zeros(runs))
         truth = Truth(at_m, np.full(runs, direction * speed_mps), np.zeros(runs))
-        told = sensors.read(truth).block
-        assert told is not None
-        present = told.present[:, 0]
-        noticed_m = at_m - direction * speed_mps * told.age_s[:, 0]
-        late_s += (direction * (noticed_m - told.joint_m[:, 0])[present] / speed_mps).tolist()
+        estimate = sensors.read(truth).block
+        assert estimate is not None
+        present = estimate.present[:, 0]
+        noticed_m = at_m - direction * speed_mps * estimate.age_s[:, 0]
+        late_s += (direction * (noticed_m - estimate.joint_m[:, 0])[present] / speed_mps).tolist()
     assert len(late_s) > 200
     assert min(late_s) >= -1e-9
     assert max(late_s) <= line.detection_s + 1e-9
@@ -209,5 +208,5 @@ def test_every_fault_of_the_table_can_be_applied() -> None:
 def test_a_fault_that_does_not_exist_is_refused() -> None:
     with pytest.raises(ValueError, match="odometer has no fault 'wrong station'"):
         SensorFault(
-            Sensor.ODOMETER, Kind.WRONG_STATION, np.zeros(1), LINE, np.random.default_rng(1)
+            Sensor.ODOMETER, FaultKind.WRONG_STATION, np.zeros(1), LINE, np.random.default_rng(1)
         )

@@ -1,4 +1,4 @@
-"""How often a protection level is exceeded, and how soon a fault is found: counted."""
+"""How often a protection level is misleading, and how soon a fault is found: counted."""
 
 from __future__ import annotations
 
@@ -7,25 +7,26 @@ from typing import Final
 
 import numpy as np
 
-from rail_signals.localizer.core import LocalizerCore
 from rail_signals.localizer.filter_bank import FloatArray
+from rail_signals.localizer.localizer import Localizer
 from rail_signals.localizer.protection_level import Reason, Status
+from rail_signals.localizer.screening import Rejection
 from rail_signals.localizer.settings import LocalizerSettings, Sensor
 
-from .faults import Kind, SensorFault
+from .faults import FaultKind, SensorFault
 from .simulation import SimulatedLine, SimulatedMotion, SimulatedSensors
 
 PLACED_M: Final = 2.0
 """Sigma with which trains are placed at the start."""
 
-_SUDDEN: Final = (Kind.FREEZE, Kind.JUMP, Kind.COME_AND_GO, Kind.WRONG_STATION)
+_SUDDEN: Final = (FaultKind.FREEZE, FaultKind.JUMP, FaultKind.COME_AND_GO, FaultKind.WRONG_STATION)
 
 
-def stated_s(sensor: Sensor, kind: Kind) -> float:
+def stated_s(sensor: Sensor, kind: FaultKind) -> float:
     """Time in which a fault is to be found, of readings of the faulty sensor [s].
 
     What jumps is refused by the gates, three readings in a row, at the first by a block. What
-    creeps in is found by comparison with what other sensors tell, which are silent at times.
+    creeps in is found by comparison with what other sensors report, which are silent at times.
     Wheels are believed to slip, or to pull, before they are believed to be wrong.
     """
     if sensor is Sensor.BLOCK:
@@ -39,15 +40,15 @@ class Tally:
 
     Parameters
     ----------
-    sensor, kind : Sensor, Kind
+    sensor, kind : Sensor, FaultKind
         The fault; None = none.
     positions : int
         Ticks of runs, from the beginning of the fault on where there is one.
     claimed : int
         Those with a position that is claimed to survive this fault.
-    exceeded, speed_exceeded : int
+    misleading, misleading_speeds : int
         Those of the claimed where the train, or its speed, was outside of the interval.
-    exceeding_runs : int
+    misleading_runs : int
         Runs in which the position was.
     protected : int
         Positions that survive any fault.
@@ -70,12 +71,12 @@ class Tally:
     """
 
     sensor: Sensor | None
-    kind: Kind | None
+    kind: FaultKind | None
     positions: int
     claimed: int
-    exceeded: int
-    speed_exceeded: int
-    exceeding_runs: int
+    misleading: int
+    misleading_speeds: int
+    misleading_runs: int
     protected: int
     false_alarms: int
     wrong_exclusions: int
@@ -97,11 +98,11 @@ class _Delays:
         self._readings = np.zeros(runs, dtype=np.int64)
 
     def tick(
-        self, large: np.ndarray, told: np.ndarray, found: np.ndarray, excluded: np.ndarray
+        self, large: np.ndarray, read: np.ndarray, found: np.ndarray, excluded: np.ndarray
     ) -> None:
         # The reading that is the first to be off by much does not count: found in its own tick is
         # found at once.
-        self._readings += self._due & told & ~self._found
+        self._readings += self._due & read & ~self._found
         self._due |= large
         self._found |= found
         self._excluded |= excluded
@@ -118,7 +119,7 @@ def tally(
     settings: LocalizerSettings,
     line: SimulatedLine,
     sensor: Sensor | None,
-    kind: Kind | None,
+    kind: FaultKind | None,
     *,
     runs: int,
     ticks: int,
@@ -133,10 +134,10 @@ def tally(
     if sensor is not None and kind is not None:
         counted_from_s = rng.uniform(*begins_s, runs)
         fault = SensorFault(sensor, kind, counted_from_s, line, rng)
-    core, delays = LocalizerCore(settings, (runs,)), _Delays(runs)
-    names = ("positions", "claimed", "exceeded", "speed_exceeded", "protected")
+    localizer, delays = Localizer(settings, (runs,)), _Delays(runs)
+    names = ("positions", "claimed", "misleading", "misleading_speeds", "protected")
     counts = dict.fromkeys(names, 0)
-    exceeding, alarmed, wrong = np.zeros((3, runs), np.bool_)
+    misled, alarmed, wrong = np.zeros((3, runs), np.bool_)
     levels, errors, reasons = [], [], np.zeros(len(Reason), dtype=np.int64)
     healthy_ticks = 0
     for tick in range(ticks):
@@ -145,42 +146,44 @@ def tally(
         readings = sensors.read(truth)
         if tick == 0:
             start_m = truth.chainage_m + PLACED_M * rng.standard_normal(runs)
-            core.place(start_m[:, None], PLACED_M, sigma_mps=30.0)
+            localizer.place(start_m[:, None], PLACED_M, sigma_mps=30.0)
         begun = time_s >= counted_from_s
         healthy_ticks += runs if fault is None else int((~begun).sum())
         if fault is not None:
             readings, falsified, large = fault.apply(readings, time_s)
-        told = core.step(tick_s if tick else 0.0, readings)
+        estimate = localizer.tick(time_s, readings)
+        found = estimate.found.copy()
+        for _, why, which in localizer.rejected:
+            if why is Rejection.FROZEN:
+                found |= np.asarray(which)[:, 0]
 
-        claimed = begun & (told.status > Status.UNAVAILABLE)
-        healthy = ~told.excluded
+        claimed = begun & (estimate.status > Status.UNAVAILABLE)
+        healthy = ~estimate.excluded
         if fault is not None:
-            claimed = claimed & ~told.uncovered[:, fault.sensor]
+            claimed = claimed & ~estimate.uncovered[:, fault.sensor]
             healthy = np.delete(healthy, fault.sensor, axis=1)
-            out = told.excluded[:, fault.sensor]
-            delays.tick(
-                begun & (falsified > large), falsified > 0.0, begun & told.found, begun & out
-            )
+            out = estimate.excluded[:, fault.sensor]
+            delays.tick(begun & (falsified > large), falsified > 0.0, begun & found, begun & out)
         wrong |= ~healthy.all(axis=1)
-        alarmed |= told.found if fault is None else told.found & ~begun
+        alarmed |= found if fault is None else found & ~begun
         s, v = truth.chainage_m, truth.speed_mps
-        outside = claimed & ((s < told.low_m) | (s > told.high_m))
-        too_fast = claimed & ((v < told.speed_low_mps) | (v > told.speed_high_mps))
-        exceeding |= outside
-        protected = begun & (told.status == Status.PROTECTED)
+        outside = claimed & ((s < estimate.low_m) | (s > estimate.high_m))
+        too_fast = claimed & ((v < estimate.speed_low_mps) | (v > estimate.speed_high_mps))
+        misled |= outside
+        protected = begun & (estimate.status == Status.PROTECTED)
         for name, which in zip(names, (begun, claimed, outside, too_fast, protected), strict=True):
             counts[name] += int(which.sum())
-        reasons += np.bincount(told.reason[begun], minlength=len(Reason))
+        reasons += np.bincount(estimate.reason[begun], minlength=len(Reason))
         if tick % 10 == 0:
-            levels.append(told.protection_m[claimed])
-            errors.append((told.position_m - s)[claimed])
+            levels.append(estimate.protection_m[claimed])
+            errors.append((estimate.position_m - s)[claimed])
     most_s = 0.0 if sensor is None or kind is None else stated_s(sensor, kind)
     delays_s, late, excluded = delays.results(tick_s, most_s)
     return Tally(
         sensor,
         kind,
         **counts,
-        exceeding_runs=int(exceeding.sum()),
+        misleading_runs=int(misled.sum()),
         false_alarms=int(alarmed.sum()),
         wrong_exclusions=int(wrong.sum()),
         healthy_s=healthy_ticks * tick_s,

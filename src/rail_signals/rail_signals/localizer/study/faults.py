@@ -1,4 +1,4 @@
-"""Faults of one sensor in simulated runs: what it tells instead of what it should.
+"""Faults of one sensor in simulated runs: what it reports instead of what it should.
 
 Each fault begins in every run at a time of its own and lasts. Its size is drawn so that the
 logarithm is uniform, from sizes that no one notices to gross ones:
@@ -39,7 +39,7 @@ from .simulation import SimulatedLine
 Reading: TypeAlias = Any
 
 
-class Kind(Enum):
+class FaultKind(Enum):
     """Kinds of faults."""
 
     BIAS = "bias"
@@ -78,9 +78,9 @@ EFFECT: Final = {
 CASES: Final = tuple(
     (sensor, kind)
     for sensor in Sensor
-    for kind in Kind
-    if not (kind is Kind.DRIFT and LAWS[sensor].drift_per_s is None)
-    and not (kind is Kind.WRONG_STATION and sensor is Sensor.ODOMETER)
+    for kind in FaultKind
+    if not (kind is FaultKind.DRIFT and LAWS[sensor].drift_per_s is None)
+    and not (kind is FaultKind.WRONG_STATION and sensor is Sensor.ODOMETER)
 )
 """Faults that there are."""
 
@@ -99,7 +99,7 @@ class SensorFault:
     Parameters
     ----------
     sensor : Sensor
-    kind : Kind
+    kind : FaultKind
     begins_s : float64 [runs]
     line : SimulatedLine
     rng : numpy.random.Generator
@@ -113,7 +113,7 @@ class SensorFault:
     def __init__(
         self,
         sensor: Sensor,
-        kind: Kind,
+        kind: FaultKind,
         begins_s: FloatArray,
         line: SimulatedLine,
         rng: np.random.Generator,
@@ -125,7 +125,9 @@ class SensorFault:
         shape, laws = self.begins_s.shape, LAWS[sensor]
         self._sign = rng.choice([-1.0, 1.0], shape)
         self._mirrored = rng.uniform(size=shape) < 0.5
-        law = {Kind.BIAS: laws.bias, Kind.DRIFT: laws.drift_per_s}.get(kind, laws.jump) or laws.jump
+        law = {FaultKind.BIAS: laws.bias, FaultKind.DRIFT: laws.drift_per_s}.get(
+            kind, laws.jump
+        ) or laws.jump
         smallest, largest = np.log(law).tolist()
         self._size = self._sign * np.exp(rng.uniform(smallest, largest, shape))
         # Lengths of the times on and off, in turn; more than there is time for.
@@ -137,38 +139,38 @@ class SensorFault:
     ) -> tuple[TickReadings, FloatArray, FloatArray]:
         """Readings of a tick with the fault, by how much it falsifies them, and what is large.
 
-        The second is 0 where the sensor tells nothing in this tick. The third is an error that the
+        The second is 0 where the sensor has no reading in this tick. The third is an error that the
         tests cannot miss when the other sensors are there: `EFFECT`, and eight times the sigma
-        that the sensor tells of itself, if it does. Both [runs].
+        that the sensor states, if it does. Both [runs].
         """
         name, value = _FIELD[self.sensor], _VALUE[self.sensor]
         healthy = getattr(readings, name)
         since_s = time_s - self.begins_s
         active = since_s >= 0.0
-        if self.kind is Kind.COME_AND_GO:
+        if self.kind is FaultKind.COME_AND_GO:
             active = active & ((self._turns_s < since_s).sum(axis=1, keepdims=True) % 2 == 0)
-        if self.kind is Kind.FREEZE:
+        if self.kind is FaultKind.FREEZE:
             changes = self._frozen(healthy, value, active)
         else:
             changes = {value: getattr(healthy, value) + self._error(healthy, since_s)}
         changes = {
-            key: np.where(active, told, getattr(healthy, key)) for key, told in changes.items()
+            key: np.where(active, false, getattr(healthy, key)) for key, false in changes.items()
         }
         if self.sensor is Sensor.ODOMETER:
             changes[value] = np.maximum(changes[value], 0.0)
         falsified = np.abs(changes[value] - getattr(healthy, value)) * healthy.present
-        told = readings._replace(**{name: healthy._replace(**changes)})
+        faulty = readings._replace(**{name: healthy._replace(**changes)})
         own = 8.0 * np.sqrt(getattr(healthy, "variance_m2", np.zeros_like(falsified)))
-        return told, falsified[:, 0], (EFFECT[self.sensor] + own)[:, 0]
+        return faulty, falsified[:, 0], (EFFECT[self.sensor] + own)[:, 0]
 
     def _error(self, healthy: Reading, since_s: FloatArray) -> FloatArray:
         line, laws = self._line, LAWS[self.sensor]
-        if self.kind is Kind.WRONG_STATION:
+        if self.kind is FaultKind.WRONG_STATION:
             return self._wrong_station(healthy)
-        if self.kind is Kind.BIAS:
+        if self.kind is FaultKind.BIAS:
             within_s = max(laws.bias_within_s, line.tick_s)
             size = np.asarray(self._size * np.clip(since_s / within_s, 0.0, 1.0), dtype=np.float64)
-        elif self.kind is Kind.DRIFT:
+        elif self.kind is FaultKind.DRIFT:
             size = np.asarray(self._size * np.maximum(since_s, 0.0), dtype=np.float64)
         else:
             return np.asarray(self._size)

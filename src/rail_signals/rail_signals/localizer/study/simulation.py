@@ -1,4 +1,4 @@
-"""Simulated runs of trains and what their sensors would tell, for measuring integrity.
+"""Simulated runs of trains and what their sensors would report, for measuring integrity.
 
 The world is not the filters' model of it, as it never is: speeds follow a driver who brakes and
 stands, not a Gauss-Markov process; wheels creep in proportion to the effort and slip in episodes;
@@ -16,11 +16,11 @@ import numpy as np
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.localizer.filter_bank import BoolArray, FloatArray
 from rail_signals.localizer.readings import (
-    BlockReading,
-    DopplerReading,
-    OdometerReading,
-    RangeReading,
+    BlockEntry,
+    DopplerFix,
+    RangeFix,
     TickReadings,
+    WheelSpeed,
 )
 
 
@@ -36,7 +36,7 @@ class SimulatedLine:
     range_sigma_m : (float, float)
         Noise, of a run.
     range_bias_m, range_bias_length_m : float
-        Sigma of the bias of a station, and the way over which it changes.
+        Sigma of the bias of a station, and the distance over which it changes.
     most_late : int
         Ticks by which a range comes late at most.
     reference_m, offset_m : float
@@ -97,7 +97,7 @@ class SimulatedMotion:
 
     def __init__(self, runs: int, direction: int, tick_s: float, rng: np.random.Generator) -> None:
         self._tick_s, self._direction, self._rng = tick_s, direction, rng
-        self._way_m = rng.uniform(10e3, 20e3, runs)
+        self._path_m = rng.uniform(10e3, 20e3, runs)
         self._speed_mps = self._chosen(runs)
         self._wanted_mps = self._speed_mps.copy()
         self._acceleration = np.zeros(runs)
@@ -110,7 +110,7 @@ class SimulatedMotion:
 
     def step(self) -> Truth:
         """Advance by a tick."""
-        dt, rng, runs = self._tick_s, self._rng, self._way_m.size
+        dt, rng, runs = self._tick_s, self._rng, self._path_m.size
         self._left_s -= dt
         due = self._left_s <= 0.0
         if due.any():
@@ -122,22 +122,22 @@ class SimulatedMotion:
         stands = (speed <= 0.0) | ((self._wanted_mps == 0.0) & (speed < 0.02))
         speed = np.where(stands, 0.0, speed)
         self._acceleration = np.where(stands, 0.0, self._acceleration)
-        self._way_m += 0.5 * (self._speed_mps + speed) * dt
+        self._path_m += 0.5 * (self._speed_mps + speed) * dt
         self._speed_mps = speed
         sign = self._sign
-        return Truth(sign * self._way_m, sign * speed, sign * self._acceleration)
+        return Truth(sign * self._path_m, sign * speed, sign * self._acceleration)
 
 
 class Drifting:
-    """Errors that change with the way: Gauss-Markov, of variance one."""
+    """Errors that change with the distance run: Gauss-Markov, of variance one."""
 
     def __init__(self, runs: int, length_m: float, rng: np.random.Generator) -> None:
         self._rng, self._length_m = rng, length_m
         self.value = rng.standard_normal(runs)
 
-    def step(self, way_m: FloatArray, renewed: BoolArray | None = None) -> FloatArray:
-        """Advance by a way; anew where `renewed`."""
-        kept = np.exp(-way_m / self._length_m)
+    def step(self, distance_m: FloatArray, renewed: BoolArray | None = None) -> FloatArray:
+        """Advance by a distance; anew where `renewed`."""
+        kept = np.exp(-distance_m / self._length_m)
         if renewed is not None:
             kept = np.where(renewed, 0.0, kept)
         fresh = self._rng.standard_normal(self.value.size)
@@ -223,7 +223,7 @@ def doppler_covariance(
 
 
 class SimulatedSensors:
-    """What the sensors of all runs tell in a tick, without faults.
+    """What the sensors of all runs report in a tick, without faults.
 
     Parameters
     ----------
@@ -254,25 +254,25 @@ class SimulatedSensors:
     def read(self, truth: Truth) -> TickReadings:
         """Readings of a tick."""
         self._past_m = [truth.chainage_m, *self._past_m[: self._line.most_late]]
-        way_m = np.abs(truth.chainage_m - self._past_m[min(1, len(self._past_m) - 1)])
+        distance_m = np.abs(truth.chainage_m - self._past_m[min(1, len(self._past_m) - 1)])
         return TickReadings(
-            self._range(truth, way_m),
-            self._doppler(truth, way_m),
+            self._range(truth, distance_m),
+            self._doppler(truth, distance_m),
             self._block(truth),
             self._odometer(truth),
         )
 
-    def _range(self, truth: Truth, way_m: FloatArray) -> RangeReading:
+    def _range(self, truth: Truth, distance_m: FloatArray) -> RangeFix:
         line, runs = self._line, truth.chainage_m.size
         late = np.minimum(self._late, len(self._past_m) - 1)
         at_m = np.stack(self._past_m)[late, np.arange(runs)]
         station = np.floor(at_m / line.station_m)
         changed = np.zeros(runs, np.bool_) if self._station is None else station != self._station
         self._station = station
-        bias_m = line.range_bias_m * self._range_bias.step(way_m, changed)
+        bias_m = line.range_bias_m * self._range_bias.step(distance_m, changed)
         noise_m = self._range_sigma_m * self._rng.standard_normal(runs)
         present = ~(self._range_out.step(line.tick_s) | changed)
-        return RangeReading(
+        return RangeFix(
             (at_m + bias_m + noise_m)[:, None],
             np.square(self._range_sigma_m)[:, None],
             (late * line.tick_s)[:, None],
@@ -280,7 +280,7 @@ class SimulatedSensors:
             present[:, None],
         )
 
-    def _doppler(self, truth: Truth, way_m: FloatArray) -> DopplerReading:
+    def _doppler(self, truth: Truth, distance_m: FloatArray) -> DopplerFix:
         line, runs = self._line, truth.chainage_m.size
         inverse, covariance = doppler_covariance(line, truth.chainage_m, truth.speed_mps)
         there = np.abs(truth.speed_mps) >= line.least_speed_mps
@@ -288,10 +288,10 @@ class SimulatedSensors:
         covariance = np.where(there, covariance, np.eye(2)[:, :, None])
         shifts_hz = line.frequency_sigma_hz * self._rng.standard_normal((2, runs))
         error = np.einsum("ij...,j...->i...", np.where(there, inverse, 0.0), shifts_hz)
-        lasting = line.doppler_bias * self._doppler_bias.step(way_m)
+        lasting = line.doppler_bias * self._doppler_bias.step(distance_m)
         error = error + lasting * covariance[0] / np.sqrt(covariance[0, 0])
         present = there & ~self._doppler_out.step(line.tick_s)
-        return DopplerReading(
+        return DopplerFix(
             (truth.chainage_m + error[0])[:, None],
             (truth.speed_mps + error[1])[:, None],
             covariance[0, 0][:, None],
@@ -301,7 +301,7 @@ class SimulatedSensors:
             present[:, None],
         )
 
-    def _block(self, truth: Truth) -> BlockReading:
+    def _block(self, truth: Truth) -> BlockEntry:
         line, runs = self._line, truth.chainage_m.size
         before_m = self._past_m[min(1, len(self._past_m) - 1)]
         block = np.floor(
@@ -309,9 +309,9 @@ class SimulatedSensors:
         )
         joint_m = block.max(axis=0) * line.block_m + self._joint_offset_m
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = (joint_m - before_m) / (truth.chainage_m - before_m)
+            passed = (joint_m - before_m) / (truth.chainage_m - before_m)
         # Times count from the end of this tick.
-        notice_s = (share - 1.0) * line.tick_s + self._rng.uniform(0.0, line.detection_s, runs)
+        notice_s = (passed - 1.0) * line.tick_s + self._rng.uniform(0.0, line.detection_s, runs)
         entered = block[0] != block[1]
         self._joint_m = np.where(entered, joint_m, self._joint_m)
         waiting = self._notice_s > 0.0
@@ -320,9 +320,9 @@ class SimulatedSensors:
         present = (entered | waiting) & (left_s <= 0.0)
         self._notice_s = left_s
         age_s = np.where(present, -left_s, 0.0)
-        return BlockReading(self._joint_m[:, None].copy(), age_s[:, None], present[:, None])
+        return BlockEntry(self._joint_m[:, None].copy(), age_s[:, None], present[:, None])
 
-    def _odometer(self, truth: Truth) -> OdometerReading:
+    def _odometer(self, truth: Truth) -> WheelSpeed:
         line, runs = self._line, truth.chainage_m.size
         speed_mps = np.abs(truth.speed_mps)
         pull = self._direction * truth.acceleration_mps2
@@ -330,4 +330,4 @@ class SimulatedSensors:
         noise_mps = line.wheel_noise_mps * self._rng.standard_normal(runs) * (speed_mps > 0.0)
         wheel_mps = speed_mps * (1.0 + self._scale + line.creep_s * pull) + slip_mps + noise_mps
         zeros, on = np.zeros((runs, 1)), np.ones((runs, 1), np.bool_)
-        return OdometerReading(np.maximum(wheel_mps, 0.0)[:, None], zeros, on)
+        return WheelSpeed(np.maximum(wheel_mps, 0.0)[:, None], zeros, on)

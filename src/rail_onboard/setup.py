@@ -25,7 +25,7 @@ setup(
             "cbtc_radio = rail_onboard.train_radio.radio_node:CbtcRadioNode.main",
             "atp = rail_onboard.train_radio.atp_node:AtpNode.main",
             "doppler_positioner = rail_onboard.doppler.positioner_node:DopplerPositionerNode.main",
-            "localizer = rail_onboard.localizer.localizer_node:main",
+            "localizer = rail_onboard.localizer.localizer_node:LocalizerNode.main",
             "bus_terminal = rail_onboard.train_bus.terminal_node:BusTerminalNode.main",
             "train_bus_monitor = rail_onboard.train_bus.monitor_node:TrainBusMonitorNode.main",
         ],

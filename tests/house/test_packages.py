@@ -82,9 +82,6 @@ def test_every_command_of_a_package_is_installed(package: str) -> None:
     expected = {
         name: f"{module}:{call}" for name, (module, call) in SCRIPTS.get(package, {}).items()
     }
-    # Not yet a node of the common base.
-    if "localizer" in expected:
-        expected["localizer"] = expected["localizer"].replace("LocalizerNode.", "")
     assert entry_points(package) == expected
     for target in entry_points(package).values():
         assert callable(EntryPoint("command", target, "console_scripts").load())
@@ -94,9 +91,6 @@ def test_every_command_of_a_package_is_installed(package: str) -> None:
 @pytest.mark.parametrize("kind", node_kinds())
 def test_every_node_starts_as_a_module(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[str] = []
-    monkeypatch.setattr(
-        "rail_msgs_py.standalone.run_node", lambda node: started.append(node.__name__)
-    )
     monkeypatch.setattr(
         "rail_msgs_py.tick_node.run_node", lambda node: started.append(node.__name__)
     )

@@ -91,6 +91,7 @@ POSITION: Final = Topic(
     "zone_controller",
     "localizer, people, the report",
     "Position of a train along its track by phase ranging; infinite variance = not known.",
+    below_owner=2,
 )
 
 #: In the order of the documentation.

@@ -16,16 +16,12 @@ from typing import Any, Final
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py.failures import TickWatch
-from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.node import Equipment
-from rail_msgs_py.parameters import ParameterError, declare, parameter
+from rail_msgs_py.decoders import table_row
+from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.position import figures_from_cdr as position_from_cdr
 from rail_msgs_py.stamps import NANOSECONDS
-from rail_msgs_py.standalone import run_node
-from rail_msgs_py.table import TableWriter
-from rail_msgs_py.table import figures_from_cdr as table_from_cdr
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
 from rail_msgs_py.topics.localizer import LOCALIZER_POSITION, LOCALIZER_STATE, TOLD_POSITION
 from rail_msgs_py.topics.ranging import POSITION
@@ -51,11 +47,6 @@ from rail_signals.localizer.settings import (
 )
 
 from .block_entries import BlockEntries
-
-#: Ports of the inbox.
-_ODOMETER, _DOPPLER, _RELAYED, _RANGED, _CODES = (
-    *("odometer", "doppler", "relayed", "ranged", "codes"),
-)
 
 
 @dataclass(frozen=True)
@@ -103,108 +94,59 @@ def settings_of(p: LocalizerParameters) -> LocalizerSettings:
 
     Raises
     ------
-    ParameterError
+    ValueError
         If they do not fit together.
     """
-    try:
-        return LocalizerSettings(
-            direction=p.direction,
-            ranging=RangeModel(bias_m=p.range_bias_m),
-            doppler=DopplerModel(),
-            block=BlockModel(detection_s=p.detection_s),
-            odometer=OdometerModel(scale=p.odometer_scale),
-            claim=IntegrityClaim(risk=p.integrity_risk, tick_s=p.tick_s, oldest_s=p.oldest_s),
-        )
-    except ValueError as error:
-        raise ParameterError(f"localizer: {error}") from None
+    return LocalizerSettings(
+        direction=p.direction,
+        ranging=RangeModel(bias_m=p.range_bias_m),
+        doppler=DopplerModel(),
+        block=BlockModel(detection_s=p.detection_s),
+        odometer=OdometerModel(scale=p.odometer_scale),
+        claim=IntegrityClaim(risk=p.integrity_risk, tick_s=p.tick_s, oldest_s=p.oldest_s),
+    )
 
 
-class LocalizerNode(Equipment):
+class LocalizerNode(EquipmentNode[LocalizerParameters], name="localizer", namespace="/train_1"):
     """The localizer of a train as a managed node; switched off it knows nothing."""
 
-    def __init__(
-        self,
-        name: str = "localizer",
-        *,
-        namespace: str = "/train_1",
-        context: Any = None,
-        parameters: Mapping[str, Any] | None = None,
-        services: bool = True,
-    ) -> None:
-        super().__init__(name, namespace, context=context, parameters=parameters, services=services)
-        self._p = p = declare(self, LocalizerParameters)
-        self._train = train = namespace.strip("/")
+    def setup(self) -> None:
+        """Open the ports of the sensors that there are."""
+        p, train = self._p, self.place
         self._localizer = Localizer(settings_of(p))
-        try:
-            self._entries = BlockEntries(p.joints_m, p.joint_carriers_hz)
-        except ValueError as error:
-            raise ParameterError(f"localizer: {error}") from None
-        self._in_service, self._believed_m = False, p.start_m
-        owners: dict[str, str] = {}
-        self.stream_in(ODOMETER, self._on_odometer, train=train)
+        self._entries = BlockEntries(p.joints_m, p.joint_carriers_hz)
+        self._in_service = False
+        self._odometer = self.inputs.trigger(ODOMETER, table_row(ODOMETER), train=train)
+        self._doppler = self._relayed = self._ranged = self._codes = ""
         if p.doppler:
-            owners[_DOPPLER] = DOPPLER_FIX.owner(train=train)
-            self._take(DOPPLER_FIX, _DOPPLER, len(DOPPLER_FIX.columns))
-        if p.told:
-            owners[_RELAYED] = TOLD_POSITION.owner(train=train)
-            self._take(
-                TOLD_POSITION, _RELAYED, len(TOLD_POSITION.columns), round(p.tick_s * NANOSECONDS)
-            )
-        if p.ranged:
-            owners[_RANGED] = POSITION.owner(train=train).rpartition("/")[0]
-            self.stream_in(POSITION, self._on_position, train=train)
-        if p.joints_m:
-            owners[_CODES] = CODE_RECEIVED.owner(train=train)
-            self._take(CODE_RECEIVED, _CODES, len(CODE_RECEIVED.columns))
-        self._inbox: TickInbox[Any] = TickInbox([_ODOMETER, *owners])
+            self._doppler = self.inputs.port(DOPPLER_FIX, table_row(DOPPLER_FIX), train=train)
         if p.told:
             # What is relayed in the first tick nobody can have received before it.
-            self._inbox.put(0, _RELAYED, None)
-        self._watch = TickWatch(self, self._inbox, owners, p.timeout_s, self._advance)
-        self._state = (
-            self.stream_out(LOCALIZER_STATE, train=train)
-            if p.told or p.joints_m  # train protection or code supervision waits for it
-            else (self.publisher(LOCALIZER_STATE, train=train).publish)
-        )
-        self._table = TableWriter((train,), LOCALIZER_STATE.columns)
+            late_ns = round(p.tick_s * NANOSECONDS)
+            row = table_row(TOLD_POSITION)
+            self._relayed = self.inputs.port(TOLD_POSITION, row, delay_ns=late_ns, train=train)
+        if p.ranged:
+            self._ranged = self.inputs.port(POSITION, self._on_own_track, train=train)
+        if p.joints_m:
+            self._codes = self.inputs.port(CODE_RECEIVED, table_row(CODE_RECEIVED), train=train)
+        # Train protection or code supervision waits for it.
+        awaited = p.told or bool(p.joints_m)
+        self._state = self.table_out(LOCALIZER_STATE, (train,), awaited=awaited, train=train)
         self._position = self.publisher(LOCALIZER_POSITION, train=train).publish
         self._writer = PositionWriter(train, p.track)
-        self.announce_when_connected()
 
-    def on_activate(self, state: Any) -> Any:
-        """Switched on again, it knows nothing of what was before: not even where it started."""
+    def start_over(self) -> None:
+        """Know nothing of what was before: not even where it started."""
         self._localizer.reset()
         self._entries.reset()
         self._believed_m = nan
-        return super().on_activate(state)
 
-    def _take(self, topic: Any, port: str, columns: int, late_ns: int = 0) -> None:
-        """Listen to a table of one row; `late_ns` is added to its stamp."""
-
-        def put(raw: bytes) -> None:
-            stamp_ns, values = table_from_cdr(raw, 1, columns)
-            self._inbox.put(stamp_ns + late_ns, port, values[0].tolist())
-            self._advance()
-
-        self.stream_in(topic, put, train=self._train)
-
-    def _on_odometer(self, raw: bytes) -> None:
-        stamp_ns, values = table_from_cdr(raw, 1, len(ODOMETER.columns))
-        self._inbox.put(stamp_ns, _ODOMETER, values[0].tolist())
-        self._watch.begin()
-        self._advance()
-
-    def _on_position(self, raw: bytes) -> None:
+    def _on_own_track(self, raw: bytes) -> tuple[int, tuple[float, float, float, float] | None]:
         stamp_ns, track, values = position_from_cdr(raw)
-        self._inbox.put(stamp_ns, _RANGED, values if track == self._p.track else None)
-        self._advance()
+        return stamp_ns, values if track == self._p.track else None
 
-    def _advance(self) -> None:
-        while self._inbox.complete:
-            self._watch.end()
-            self._locate(*self._inbox.take())
-
-    def _locate(self, stamp_ns: int, items: Mapping[str, Any]) -> None:
+    def on_tick(self, stamp_ns: int, items: Mapping[str, Any]) -> None:
+        """Locate the train by what its sensors say in a tick."""
         # The place where it is put into service is that of the first tick and of no later one.
         starting, self._in_service = not self._in_service, True
         columns: tuple[float, ...] = _UNKNOWN
@@ -230,11 +172,11 @@ class LocalizerNode(Equipment):
         known = isfinite(front_m)
         if known:
             self._believed_m = front_m
-        self._state(self._table.write(stamp_ns, np.array([columns])))
+        self._state(stamp_ns, np.array([columns]))
         last_m = self._believed_m if isfinite(self._believed_m) else self._p.start_m
         place = Position(
             stamp_ns,
-            self._train,
+            self.place,
             self._p.track,
             front_m if known else last_m,
             state["sigma_m"] ** 2 if known else inf,
@@ -246,14 +188,14 @@ class LocalizerNode(Equipment):
     def _readings(self, stamp_ns: int, items: Mapping[str, Any]) -> TickReadings:
         return TickReadings(
             range=self._range_of(stamp_ns, items),
-            doppler=_doppler_of(items.get(_DOPPLER)),
-            block=self._block_of(items.get(_CODES)),
-            odometer=_odometer_of(items.get(_ODOMETER)),
+            doppler=_doppler_of(items.get(self._doppler)),
+            block=self._block_of(items.get(self._codes)),
+            odometer=_odometer_of(items.get(self._odometer)),
         )
 
     def _range_of(self, stamp_ns: int, items: Mapping[str, Any]) -> RangeFix | None:
         """Range relayed by radio or shared by the wayside, None where they say there is none."""
-        relayed, shared = items.get(_RELAYED), items.get(_RANGED)
+        relayed, shared = items.get(self._relayed), items.get(self._ranged)
         if relayed is not None:
             time_s, position_m, half_m = relayed
             if isnan(time_s) and isnan(position_m):
@@ -329,10 +271,5 @@ def _words(rejected: Sequence[Rejected]) -> str:
     return "; ".join(f"{sensor.name.lower()}: {why.value}" for sensor, why, _ in rejected)
 
 
-def main() -> None:
-    """Run the localizer of a train on its own."""
-    run_node(LocalizerNode)
-
-
 if __name__ == "__main__":
-    main()
+    LocalizerNode.main()

@@ -372,9 +372,7 @@ class RunBuilder:
         for name in self.buses:
             self.bus(name)
 
-    def _put(
-        self, record: Record, row: int, columns: Sequence[str], **figures: ArrayLike
-    ) -> None:
+    def _put(self, record: Record, row: int, columns: Sequence[str], **figures: ArrayLike) -> None:
         """Put one row of every tick; each column has a figure, or an array over the ticks."""
         for tick, values in enumerate(self._rows(columns, figures)):
             record.put(tick, row, values)

@@ -80,14 +80,17 @@ def _localizer(
         located[there, LOCALIZER_STATE.index["high_m"]],
     )
     truth_m = front_m[there]
+    # An interval that is no number holds nothing.
+    holds = (low_m <= truth_m) & (truth_m <= high_m)
     level_m = 0.5 * (high_m - low_m)
+    level_m = level_m[np.isfinite(level_m)]
     return {
         "availability": _share(there, on_line),
         "protected": _share(there & (located[:, LOCALIZER_STATE.index["status"]] > 1.0), on_line),
         **_errors(located[there, LOCALIZER_STATE.index["front_m"]] - truth_m),
         "protection_level_m": float(np.median(level_m)) if level_m.size else None,
         "protection_level_p95_m": float(np.quantile(level_m, 0.95)) if level_m.size else None,
-        "exceeded": int(np.count_nonzero((truth_m < low_m) | (truth_m > high_m))),
+        "exceeded": int(np.count_nonzero(~holds)),
         "excluded_ticks": int(
             np.count_nonzero(located[there, LOCALIZER_STATE.index["excluded"]] > 0.0)
         ),
@@ -95,7 +98,7 @@ def _localizer(
 
 
 def _errors(error_m: FloatArray) -> dict[str, float | int | None]:
-    size_m = np.abs(error_m)
+    size_m = np.abs(error_m[np.isfinite(error_m)])
     if not size_m.size:
         return {"rmse_m": None, "p95_m": None, "max_m": None}
     return {

@@ -164,8 +164,9 @@ def tally(
         wrong |= ~healthy.all(axis=1)
         alarmed |= told.found if fault is None else told.found & ~begun
         s, v = truth.chainage_m, truth.speed_mps
-        outside = claimed & ((s < told.low_m) | (s > told.high_m))
-        too_fast = claimed & ((v < told.speed_low_mps) | (v > told.speed_high_mps))
+        # What is no number holds nothing.
+        outside = claimed & ~((told.low_m <= s) & (s <= told.high_m))
+        too_fast = claimed & ~((told.speed_low_mps <= v) & (v <= told.speed_high_mps))
         exceeding |= outside
         protected = begun & (told.status == Status.PROTECTED)
         for name, which in zip(names, (begun, claimed, outside, too_fast, protected), strict=True):

@@ -21,6 +21,7 @@ from rail_msgs_py.train_radio.safe_frame import (
     write_header,
 )
 from rail_msgs_py.train_radio.safe_result import Accepted, Greeted, Opened, Reason, Rejected
+from rail_msgs_py.train_radio.train_channel import controller_end, train_end
 
 SECRET = b"a secret for the tests"
 CONTROLLER, TRAIN, OTHER_TRAIN = 1, 101, 102
@@ -309,3 +310,21 @@ def test_bad_arguments_are_quoted() -> None:
         channel.seal(REPORT, bytes(33), 0)
     with pytest.raises(ValueError, match=r"time_ns .* got -1"):
         channel.seal(REPORT, b"", -1)
+
+
+@pytest.mark.parametrize("restarts", [0, 1, 2])
+def test_a_train_that_is_switched_on_anew_draws_other_nonces(restarts: int) -> None:
+    """With those of before its greetings are taken for old ones of the session it has lost."""
+    secret, tick_s = "00" * 16, 0.25
+    up, down = Kind.LOCATION_REPORT, Kind.MOVEMENT_AUTHORITY
+    controller = controller_end(secret, 1, 7, tick_s)
+    before = train_end(secret, 1, 7, tick_s)
+    before.open(controller.seal(down, b"", 0), 0)
+    controller.open(before.seal(up, b"", 0), 0)
+    assert controller.established
+    assert isinstance(before.open(controller.seal(down, b"", 0), 0), Accepted)
+    anew = train_end(secret, 1, 7, tick_s, restarts)
+    assert controller.open(anew.seal(up, b"", 10**6), 10**6) == Greeted(False)
+    answer = anew.open(controller.seal(down, b"", 10**6), 10**6)
+    lost = Rejected(Reason.UNKNOWN_SESSION)
+    assert answer == (Greeted(True) if restarts else lost)

@@ -77,8 +77,8 @@ class AtpParameters:
     )
 
 
-def protection_of(p: AtpParameters) -> TrainProtection:
-    """Protection of the parameters.
+def protection_of(p: AtpParameters, restarts: int = 0) -> TrainProtection:
+    """Protection of the parameters, after it was switched on anew so often.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def protection_of(p: AtpParameters) -> TrainProtection:
             braking=braking,
             thresholds=thresholds,
         )
-        channel = train_end(p.secret, p.seed, p.number, p.tick_s)
+        channel = train_end(p.secret, p.seed, p.number, p.tick_s, restarts)
     except ValueError as error:
         raise ParameterError(f"atp: {error}") from None
     identity = TrainIdentity(p.number, p.segment, p.start_m, p.placed_m, p.length_m)
@@ -128,6 +128,7 @@ class AtpNode(Equipment):
         super().__init__(name, namespace, context=context, parameters=parameters, services=services)
         self._p = declare(self, AtpParameters)
         self._protection = protection_of(self._p)
+        self._activations = 0
         train = namespace.strip("/")
         owners = {_RADIO: f"/{train}/cbtc_radio"}
         if self._p.localizer:
@@ -148,7 +149,8 @@ class AtpNode(Equipment):
 
     def on_activate(self, state: Any) -> Any:
         """Switched on again, it knows nothing of what was before."""
-        self._protection = protection_of(self._p)
+        self._protection = protection_of(self._p, self._activations)
+        self._activations += 1
         return super().on_activate(state)
 
     def _on_odometer(self, raw: bytes) -> None:

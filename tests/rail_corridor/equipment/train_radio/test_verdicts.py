@@ -30,6 +30,7 @@ def test_the_figures_that_the_ways_below_are_computed_from() -> None:
     assert plan is not None
     assert (plan.emergency_mps2, train.vehicle.length_m) == (EMERGENCY_MPS2, LENGTH_M)
     assert (TICK_S, plan.braking_mps2, plan.timeout_s) == (0.25, 0.7, 3.0)
+    assert OVERSPEED_MPS == 0.5
 
 
 def test_a_good_run_has_nothing_to_be_ashamed_of() -> None:

@@ -232,6 +232,8 @@ def run_checks(pytest_arguments: list[str]) -> int:
         "ruff check": [str(VENV / "bin" / "ruff"), "check", "."],
         "mypy": [python, "-m", "mypy"],
         "documents": [python, str(ROOT / "docs" / "refresh.py"), "--check"],
+        # Faults put into copies of the sources, each of which a test must notice.
+        "mutants": [python, str(ROOT / "tests" / "mutants.py")],
     }
     failed: list[str] = []
     if not pytest_arguments:

@@ -110,8 +110,21 @@ class Verdict:
 
 
 def _group(file: str, tests: str, *faults: tuple[str, str, str]) -> list[Mutant]:
-    """Faults of one file that the same tests are to notice: name, old text, new text."""
-    return [Mutant(name, file, old, new, tuple(tests.split())) for name, old, new in faults]
+    """Faults of one file that the same tests are to notice: name, old text, new text.
+
+    ``tests`` are files of tests; where names follow, each after ``::``, only these.
+    """
+    chosen: list[str] = []
+    for word in tests.split():
+        path, _, test = word.partition("::")
+        if test and not path:
+            file_of_it = chosen[-1].partition("::")[0]
+            if chosen[-1] == file_of_it:
+                chosen.pop()
+            chosen.append(f"{file_of_it}::{test}")
+        else:
+            chosen.append(word)
+    return [Mutant(name, file, old, new, tuple(chosen)) for name, old, new in faults]
 
 
 _REPORTS = "rail_corridor/equipment"
@@ -227,7 +240,9 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{CORRIDOR}/studies/threats.py",
-        "rail_corridor/studies/test_verdicts.py rail_corridor/studies/test_threats.py",
+        "rail_corridor/studies/test_verdicts.py"
+        " ::test_the_oracle_sees_other_content_than_was_sealed"
+        " rail_corridor/studies/test_threats.py ::test_the_oracle_sees_a_missing_check",
         ("other content is accepted", "accepted.payload != sealed.payload or ", "False and "),
         ("what is old is accepted", "> _MAX_AGE_NS:", "> 10 * _MAX_AGE_NS:"),
         (
@@ -272,14 +287,18 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{WAYSIDE}/ranging/train_tracker.py",
-        "rail_wayside/ranging/test_train_tracker.py",
+        "rail_wayside/ranging/test_train_tracker.py"
+        " ::test_a_reading_that_jumps_is_not_believed"
+        " ::test_a_train_that_was_lost_is_known_a_second_and_a_half_after_it_is_found",
         ("the gate is ten times as wide", "GATE_M = 12.0", "GATE_M = 120.0"),
         ("6 sigma of the gate are 60", "SIGMAS = 6.0", "SIGMAS = 60.0"),
         ("a train that was lost is known at once", "CONFIRMED_S = 1.5", "CONFIRMED_S = 0.0"),
     ),
     *_group(
         f"{WAYSIDE}/ranging/ranging_station.py",
-        "rail_wayside/ranging/test_ranging_station.py",
+        "rail_wayside/ranging/test_ranging_station.py"
+        " ::test_two_trains_are_told_and_give_no_range"
+        " ::test_two_tones_that_cannot_tell_the_cycle_give_no_range",
         ("two signals make a range", "if second_signal(", "if False and second_signal("),
         ("a cycle that is not known is taken", "if math.isnan(range_m):", "if False:"),
     ),
@@ -292,18 +311,20 @@ MUTANTS: list[Mutant] = [
     # Track codes.
     *_group(
         "rail_signals/rail_signals/track_code/word.py",
-        "rail_signals/track_code/test_word.py",
+        "rail_signals/track_code/test_word.py ::test_one_two_or_three_wrong_bits_never_pass",
         ("check bits are not looked at", "word >> degree) != check:", "word >> degree) < 0:"),
     ),
     *_group(
         f"{WAYSIDE}/track_code/code_logic.py",
-        "rail_wayside/track_code/test_code_logic.py",
+        "rail_wayside/track_code/test_code_logic.py ::test_unknown_is_occupied"
+        " ::test_the_last_block_before_the_overlap_ends_at_a_stand",
         ("not known is free", "if occupied[index] is False", "if not occupied[index]"),
         ("no overlap is kept", "if free >= self._overlap", "if free >= 0"),
     ),
     *_group(
         f"{ONBOARD}/track_code/supervision.py",
-        "rail_onboard/track_code/test_supervision.py",
+        "rail_onboard/track_code/test_supervision.py"
+        " ::test_the_response_time_itself_is_forgiven ::test_to_pass_a_stop_trips_the_train",
         (
             "a code may be ten times as old",
             "> self._delays.response_s + 1e-9",
@@ -318,7 +339,9 @@ MUTANTS: list[Mutant] = [
     # Braking and authorities.
     *_group(
         f"{ONBOARD}/braking_curve.py",
-        "rail_onboard/train_radio/test_supervision.py",
+        "rail_onboard/train_radio/test_supervision.py"
+        " ::test_the_permitted_speed_leaves_just_the_way_to_stop_before_the_end"
+        " ::test_a_fall_and_the_error_of_the_speed_count_at_both_ends",
         ("motors stop at once", "return self.traction_mps2 + GRAVITY", "return GRAVITY"),
         (
             "no fall takes from the brake",
@@ -333,7 +356,12 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{ONBOARD}/train_radio/supervision.py",
-        "rail_onboard/train_radio/test_supervision.py",
+        "rail_onboard/train_radio/test_supervision.py"
+        " ::test_the_permitted_speed_leaves_just_the_way_to_stop_before_the_end"
+        " ::test_communication_is_lost_by_the_age_of_the_authority"
+        " ::test_the_emergency_curve_to_the_end_itself"
+        " ::test_old_and_future_authorities_and_those_out_of_order_are_ignored"
+        " ::test_a_train_that_does_not_know_where_it_is_stops",
         ("no margin before the end", "left_m = ahead_m - self._margin_m", "left_m = ahead_m"),
         ("the front is where it is believed", "s + location.uncertainty_m, s", "s, s"),
         (
@@ -347,7 +375,9 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{ONBOARD}/train_radio/train_location.py",
-        "rail_onboard/train_radio/test_train_location.py",
+        "rail_onboard/train_radio/test_train_location.py"
+        " ::test_a_fix_is_brought_to_now_by_the_odometer"
+        " ::test_fixes_that_contradict_each_other_leave_the_hull_until_one_agrees",
         (
             "the wheels are exact",
             "self._high_m += (1.0 + self._error) * run_m",
@@ -366,7 +396,10 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{WAYSIDE}/train_radio/moving_block.py",
-        "rail_wayside/train_radio/test_moving_block.py",
+        "rail_wayside/train_radio/test_moving_block.py"
+        " ::test_the_end_lies_a_margin_behind_the_worst_rear_ahead"
+        " ::test_trains_in_the_wrong_order_must_stop"
+        " ::test_a_train_that_turns_up_further_back_occupies_both_and_is_told_less",
         ("no margin behind a train", "end_m = before_m - self._margin_m", "end_m = before_m"),
         ("authorities end a metre further on", "direction * end_m,", "direction * end_m + 1.0,"),
         ("trains out of order run on", "stop = inverted(bounds)", "stop = False"),
@@ -374,7 +407,10 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{WAYSIDE}/train_radio/train_bounds.py",
-        "rail_wayside/train_radio/test_moving_block.py",
+        "rail_wayside/train_radio/test_moving_block.py"
+        " ::test_a_range_that_disagrees_makes_the_hull_until_a_new_one_agrees"
+        " ::test_a_leap_is_not_believed_until_it_is_possible_or_ranged"
+        " ::test_without_integrity_the_rear_does_not_advance",
         ("a range never contradicts", "if self._apart(self._report, self._range):", "if False:"),
         ("a leap is believed", "if self._apart(self._proven, where):", "if False:"),
         ("ranges of 60 sigma", "self._sigmas * sigma_m", "10.0 * self._sigmas * sigma_m"),
@@ -383,7 +419,11 @@ MUTANTS: list[Mutant] = [
     # The safe channel.
     *_group(
         f"{MESSAGES}/safe_channel.py",
-        "rail_msgs_py/train_radio/test_safe_channel.py rail_corridor/studies/test_threats.py",
+        "rail_msgs_py/train_radio/test_safe_channel.py"
+        " ::test_every_single_bit_matters ::test_repetition_and_order"
+        " ::test_age_counts_the_clock_skew_against_the_frame"
+        " ::test_wrong_train_wrong_way_wrong_kind_and_wrong_key"
+        " ::test_recorded_greetings_neither_make_nor_cut_a_session",
         ("any safety code will do", "return code.matches(frame)", "return True"),
         (
             "frames of any age are taken",
@@ -399,13 +439,17 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{MESSAGES}/safe_frame.py",
-        "rail_msgs_py/train_radio/test_safe_channel.py",
+        "rail_msgs_py/train_radio/test_safe_channel.py"
+        " ::test_a_frame_is_one_burst_and_stands_as_documented ::test_every_single_bit_matters"
+        " ::test_what_is_thrown_back_at_its_sender_has_another_key",
         ("half of the safety code counts", "frame[_CODE_AT:])", "frame[_CODE_AT:_CODE_AT + 4])"),
         ("both directions have one key", 'b"direction" + pair', 'b"direction"'),
     ),
     *_group(
         f"{MESSAGES}/train_channel.py",
-        "rail_msgs_py/train_radio/test_safe_channel.py",
+        "rail_msgs_py/train_radio/test_safe_channel.py"
+        " ::test_frames_of_trains_may_be_three_ticks_old_or_a_second"
+        " ::test_a_train_that_is_switched_on_anew_draws_other_nonces",
         ("frames may be 10 s old", "max(1.0, 3.0 * tick_s)", "max(10.0, 3.0 * tick_s)"),
         ("nonces come again after a restart", "*([restarts] if restarts else [])", ""),
     ),
@@ -428,7 +472,7 @@ MUTANTS: list[Mutant] = [
             "low = np.where(hull, low, np.inf).min(axis=-1)",
             "low = low[..., 0]",
         ),
-        ("any width is given", "position_m)[S] > self._claim.widest_m", "position_m)[S] > 1e9"),
+        ("any width is given", "middle - low)[S] > self._claim.widest_m", "middle - low)[S] > 1e9"),
     ),
     *_group(
         f"{LOCALIZER}/integrity_monitor.py",
@@ -447,12 +491,9 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{ONBOARD}/localizer/located.py",
-        "nodes/test_atp_node.py::test_with_a_localizer_it_is_where_that_says_or_stops",
-        (
-            "an infinite interval is a place",
-            "if not (isfinite(low_m) and isfinite(high_m)):",
-            "if False:",
-        ),
+        "nodes/test_track_code_nodes.py"
+        "::test_supervision_judges_the_fastest_that_a_localizer_allows",
+        ("a train is as fast as at least", "max(abs(bound) for bound", "min(abs(bound) for bound"),
     ),
 ]
 

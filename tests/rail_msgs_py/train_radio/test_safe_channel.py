@@ -195,6 +195,36 @@ def test_wrong_train_wrong_way_wrong_kind_and_wrong_key() -> None:
     assert reason(end(TRAIN, CONTROLLER, 7).open(greeting, SECOND)) is Reason.WRONG_ADDRESS
 
 
+def test_what_is_thrown_back_at_its_sender_has_another_key() -> None:
+    secret, nonces = bytes(range(32)), (bytes(16), bytes([1]) * 16)
+    there, back, other = (DirectionKeys(secret, *ends) for ends in ((1, 2), (2, 1), (1, 3)))
+    for keys in (back, other):
+        assert keys.greeting.of(b"hello") != there.greeting.of(b"hello")
+        assert keys.session(*nonces).code.of(b"hello") != there.session(*nonces).code.of(b"hello")
+    train = end(TRAIN, CONTROLLER, 8)
+    greeting = train.seal(REPORT, b"", SECOND)
+    header = read_header(greeting)._replace(source=CONTROLLER, destination=TRAIN)
+    mirrored = write_header(header) + greeting[24:]
+    assert reason(train.open(mirrored, SECOND)) is Reason.SAFETY_CODE
+
+
+@pytest.mark.parametrize(("tick_s", "oldest_s"), [(0.25, 1.0), (0.1, 1.0), (0.5, 1.5)])
+def test_frames_of_trains_may_be_three_ticks_old_or_a_second(
+    tick_s: float, oldest_s: float
+) -> None:
+    secret, down = "00" * 16, Kind.MOVEMENT_AUTHORITY
+    for late_ns, taken in ((0, True), (1000, False)):
+        controller, train = controller_end(secret, 1, 7, tick_s), train_end(secret, 1, 7, tick_s)
+        train.open(controller.seal(down, b"", 0), 0)
+        controller.open(train.seal(Kind.LOCATION_REPORT, b"", 0), 0)
+        frame = controller.seal(down, b"go", SECOND)
+        opened = train.open(frame, SECOND + round(oldest_s * 1e9) + late_ns)
+        if taken:
+            assert isinstance(opened, Accepted)
+        else:
+            assert opened == Rejected(Reason.TOO_OLD)
+
+
 def test_a_receiver_that_restarted_takes_nothing_recorded_before() -> None:
     controller, train = pair()
     # Still fresh, never received: the age and the numbers alone would let them pass.

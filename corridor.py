@@ -233,6 +233,8 @@ def run_checks(pytest_arguments: list[str]) -> int:
         "imports": [str(VENV / "bin" / "lint-imports"), "--no-cache"],
         "mypy": [python, "-m", "mypy"],
         "documents": [python, str(ROOT / "docs" / "refresh.py"), "--check"],
+        # Faults put into copies of the sources, each of which a test must notice.
+        "mutants": [python, str(ROOT / "tests" / "mutants.py")],
     }
     failed: list[str] = []
     if not pytest_arguments:

@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 import rclpy
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.experimental.events_executor import EventsExecutor
@@ -100,6 +102,12 @@ class Graph:
         answer = client.call_async(request)
         self.wait(answer.done)
         return answer.result()
+
+    def switch(self, name: str, *, on: bool) -> None:
+        """Switch a node off or on by its lifecycle service."""
+        kind = Transition.TRANSITION_ACTIVATE if on else Transition.TRANSITION_DEACTIVATE
+        request = ChangeState.Request(transition=Transition(id=kind))
+        assert self.call(ChangeState, f"{name}/change_state", request).success
 
     def close(self) -> None:
         self._executor.shutdown()

@@ -15,8 +15,8 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
-from rail_corridor.run.plan import make_plan
-from rail_corridor.scenario.model import load_scenario
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import make_plan
 from rail_msgs_py.decoders import table_row
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.stamps import clock_to_cdr
@@ -189,7 +189,7 @@ class EchoMedium(MediumNode[MediumParameters], name="echo", namespace="/world"):
     """Delivers to each site what its head sends."""
 
     def setup(self) -> None:
-        self.trains = len(self.part(RadioDescription, "ranging").trains)
+        self.trains = len(self.part("ranging", RadioDescription).trains)
         self._state = self.state_port(self.inputs, self.trains)
         self._out = self.table_out(COUNT, ("ac1",), awaited=True, site="ac1")
 
@@ -203,7 +203,7 @@ class BusEcho(EchoMedium, name="bus_echo", namespace="/world"):
     """Needs a part that the world does not have."""
 
     def setup(self) -> None:
-        self.part(BusDescription, "train bus")
+        self.part("train_bus", BusDescription)
 
 
 @pytest.fixture
@@ -230,7 +230,7 @@ def test_a_medium_is_done_once_it_has_delivered(graph: Any, world_file: str) -> 
 def test_a_medium_without_its_part_of_the_world_says_so(graph: Any, world_file: str) -> None:
     with pytest.raises(ParameterError) as caught:
         BusEcho(context=graph.context, parameters={"world_file": world_file}, services=False)
-    assert str(caught.value) == f"bus_echo: world_file: {world_file}: describes no train bus"
+    assert str(caught.value) == f"bus_echo: world_file: {world_file}: describes no train_bus"
 
 
 def test_a_node_that_cannot_be_switched_off_has_no_lifecycle(graph: Any, world_file: str) -> None:

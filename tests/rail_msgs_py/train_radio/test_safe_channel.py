@@ -21,6 +21,7 @@ from rail_msgs_py.train_radio.safe_frame import (
     write_header,
 )
 from rail_msgs_py.train_radio.safe_result import Accepted, Greeted, Opened, Reason, Rejected
+from rail_msgs_py.train_radio.train_channel import controller_end, train_end
 
 SECRET = b"a secret for the tests"
 CONTROLLER, TRAIN, OTHER_TRAIN = 1, 101, 102
@@ -194,6 +195,36 @@ def test_wrong_train_wrong_way_wrong_kind_and_wrong_key() -> None:
     assert reason(end(TRAIN, CONTROLLER, 7).open(greeting, SECOND)) is Reason.WRONG_ADDRESS
 
 
+def test_what_is_thrown_back_at_its_sender_has_another_key() -> None:
+    secret, nonces = bytes(range(32)), (bytes(16), bytes([1]) * 16)
+    there, back, other = (DirectionKeys(secret, *ends) for ends in ((1, 2), (2, 1), (1, 3)))
+    for keys in (back, other):
+        assert keys.greeting.of(b"hello") != there.greeting.of(b"hello")
+        assert keys.session(*nonces).code.of(b"hello") != there.session(*nonces).code.of(b"hello")
+    train = end(TRAIN, CONTROLLER, 8)
+    greeting = train.seal(REPORT, b"", SECOND)
+    header = read_header(greeting)._replace(source=CONTROLLER, destination=TRAIN)
+    mirrored = write_header(header) + greeting[24:]
+    assert reason(train.open(mirrored, SECOND)) is Reason.SAFETY_CODE
+
+
+@pytest.mark.parametrize(("tick_s", "oldest_s"), [(0.25, 1.0), (0.1, 1.0), (0.5, 1.5)])
+def test_frames_of_trains_may_be_three_ticks_old_or_a_second(
+    tick_s: float, oldest_s: float
+) -> None:
+    secret, down = "00" * 16, Kind.MOVEMENT_AUTHORITY
+    for late_ns, taken in ((0, True), (1000, False)):
+        controller, train = controller_end(secret, 1, 7, tick_s), train_end(secret, 1, 7, tick_s)
+        train.open(controller.seal(down, b"", 0), 0)
+        controller.open(train.seal(Kind.LOCATION_REPORT, b"", 0), 0)
+        frame = controller.seal(down, b"go", SECOND)
+        opened = train.open(frame, SECOND + round(oldest_s * 1e9) + late_ns)
+        if taken:
+            assert isinstance(opened, Accepted)
+        else:
+            assert opened == Rejected(Reason.TOO_OLD)
+
+
 def test_a_receiver_that_restarted_takes_nothing_recorded_before() -> None:
     controller, train = pair()
     # Still fresh, never received: the age and the numbers alone would let them pass.
@@ -309,3 +340,21 @@ def test_bad_arguments_are_quoted() -> None:
         channel.seal(REPORT, bytes(33), 0)
     with pytest.raises(ValueError, match=r"time_ns .* got -1"):
         channel.seal(REPORT, b"", -1)
+
+
+@pytest.mark.parametrize("restarts", [0, 1, 2])
+def test_a_train_that_is_switched_on_anew_draws_other_nonces(restarts: int) -> None:
+    """With those of before its greetings are taken for old ones of the session it has lost."""
+    secret, tick_s = "00" * 16, 0.25
+    up, down = Kind.LOCATION_REPORT, Kind.MOVEMENT_AUTHORITY
+    controller = controller_end(secret, 1, 7, tick_s)
+    before = train_end(secret, 1, 7, tick_s)
+    before.open(controller.seal(down, b"", 0), 0)
+    controller.open(before.seal(up, b"", 0), 0)
+    assert controller.established
+    assert isinstance(before.open(controller.seal(down, b"", 0), 0), Accepted)
+    anew = train_end(secret, 1, 7, tick_s, restarts)
+    assert controller.open(anew.seal(up, b"", 10**6), 10**6) == Greeted(False)
+    answer = anew.open(controller.seal(down, b"", 10**6), 10**6)
+    lost = Rejected(Reason.UNKNOWN_SESSION)
+    assert answer == (Greeted(True) if restarts else lost)

@@ -280,6 +280,25 @@ def test_a_train_is_lost_and_found(how: str) -> None:
     assert known(fix)
 
 
+def test_a_train_that_was_lost_is_known_a_second_and_a_half_after_it_is_found() -> None:
+    wayside = Wayside({"a": main_line(250.0, 10.0)}, {"a": "z2"})
+    for time_s in times(5.0):
+        wayside.deaf = {"z2"} if 1.0 <= time_s < 2.95 else set()
+        fix = wayside.tick(time_s)["a"]
+        # Heard again from 3.0 s on: at 4.4 s it is not believed yet, at 4.5 s it is.
+        assert known(fix) == (time_s < 0.95 or time_s > 4.45), time_s
+        assert known(fix) or fix.reason
+    assert CONFIRMED_S == 1.5
+
+
+def test_a_short_silence_is_no_loss() -> None:
+    wayside = Wayside({"a": main_line(250.0, 10.0)}, {"a": "z2"})
+    for time_s in times(5.0):
+        # From the last reading to the next it is nine ticks: up to a second it is followed.
+        wayside.deaf = {"z2"} if 1.95 < time_s < 2.75 else set()
+        assert known(wayside.tick(time_s)["a"]) == (not wayside.deaf), time_s
+
+
 def test_a_reading_that_jumps_is_not_believed() -> None:
     wayside = Wayside({"a": main_line(250.0, 10.0)}, {"a": "z2"})
     for time_s in times(5.0):

@@ -16,7 +16,7 @@ from .tables import metres, new_table, percent
 
 def errors_of(error_m: FloatArray) -> dict[str, float | int | None]:
     """Root mean square, 95 % quantile and largest of errors; None without any."""
-    size_m = np.abs(error_m)
+    size_m = np.abs(error_m[np.isfinite(error_m)])
     if not size_m.size:
         return {"rmse_m": None, "p95_m": None, "max_m": None}
     return {

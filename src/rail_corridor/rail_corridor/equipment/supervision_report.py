@@ -58,7 +58,8 @@ def trains_ahead(
         together = on_line & (theirs[:, STATE.index["on_line"]] > 0.0)
         together &= theirs[:, STATE.index["track_index"]] == mine[:, STATE.index["track_index"]]
         front_m = theirs[:, STATE.index["chainage_m"]]
-        ahead = together & (front_m > mine[:, STATE.index["chainage_m"]])
+        # Side by side each is in the other.
+        ahead = together & (front_m >= mine[:, STATE.index["chainage_m"]])
         yield ahead, front_m, front_m - train.vehicle.length_m
 
 

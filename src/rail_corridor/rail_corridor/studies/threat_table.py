@@ -18,7 +18,7 @@ def threat_campaign(frames: int, seed: int, console: Console, path: Path | None 
     rows = run_threat_campaign(frames, seed=seed)
     print_threat_rows(rows, console)
     if path is not None:
-        path.write_text(json.dumps([asdict(row) for row in rows], indent=2) + "\n")
+        write_threat_rows(rows, path)
     return 1 if any(row.wrongly_accepted for row in rows) else 0
 
 
@@ -46,3 +46,14 @@ def print_threat_rows(rows: Iterable[CampaignRow], console: Console) -> None:
         shown = f"[red]{wrong}[/red]" if wrong else "0"
         table.add_row(row.threats, *(str(count) for count in counts), shown)
     console.print(table)
+
+
+def write_threat_rows(rows: Iterable[CampaignRow], path: Path) -> None:
+    """Write the campaign as a list of objects, one per row."""
+    # What `asdict` makes of a Counter counts its items.
+    dicts = [
+        asdict(row)
+        | {"wrongly_accepted": dict(row.wrongly_accepted), "rejected": dict(row.rejected)}
+        for row in rows
+    ]
+    path.write_text(json.dumps(dicts, indent=2) + "\n")

@@ -39,10 +39,15 @@ def controller_end(secret: str, seed: int, train: int, tick_s: float) -> SafeCha
     return _end(secret, seed, _CONTROLLER_NONCES, train, ends, Kind.LOCATION_REPORT, tick_s)
 
 
-def train_end(secret: str, seed: int, train: int, tick_s: float) -> SafeChannel:
-    """The train's end: takes movement authorities. Parameters as of `controller_end`."""
+def train_end(secret: str, seed: int, train: int, tick_s: float, restarts: int = 0) -> SafeChannel:
+    """The train's end: takes movement authorities. Parameters as of `controller_end`.
+
+    ``restarts`` counts how often it was switched on anew: an end that drew the nonces of before
+    would take what was recorded before, and the peer would take its greetings for old ones.
+    """
     ends = (train, CONTROLLER_IDENTITY)
-    return _end(secret, seed, _TRAIN_NONCES, train, ends, Kind.MOVEMENT_AUTHORITY, tick_s)
+    kind = Kind.MOVEMENT_AUTHORITY
+    return _end(secret, seed, _TRAIN_NONCES, train, ends, kind, tick_s, restarts)
 
 
 def _end(
@@ -53,8 +58,10 @@ def _end(
     ends: tuple[int, int],
     accepts: Kind,
     tick_s: float,
+    restarts: int = 0,
 ) -> SafeChannel:
-    bits = np.random.Philox(np.random.SeedSequence([seed, stream, train]))
+    key = [seed, stream, train, *([restarts] if restarts else [])]
+    bits = np.random.Philox(np.random.SeedSequence(key))
     draw = np.random.Generator(bits).bytes
     max_age_s = max(1.0, 3.0 * tick_s)
     return SafeChannel(bytes.fromhex(secret), *ends, (accepts,), draw, max_age_s=max_age_s)

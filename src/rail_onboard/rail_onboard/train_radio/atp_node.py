@@ -72,8 +72,8 @@ class AtpParameters:
     )
 
 
-def protection_of(p: AtpParameters) -> TrainProtection:
-    """Protection of the parameters.
+def protection_of(p: AtpParameters, restarts: int = 0) -> TrainProtection:
+    """Protection of the parameters, after it was switched on anew so often.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def protection_of(p: AtpParameters) -> TrainProtection:
         braking=braking,
         thresholds=thresholds,
     )
-    channel = train_end(p.secret, p.seed, p.number, p.tick_s)
+    channel = train_end(p.secret, p.seed, p.number, p.tick_s, restarts)
     identity = TrainIdentity(p.number, p.segment, p.start_m, p.placed_m, p.length_m)
     return TrainProtection(identity, channel, TrainLocation(p.odometer_error), supervision)
 
@@ -111,6 +111,7 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
     def setup(self) -> None:
         """Open the ports of the train."""
         train = self.place
+        self._starts = 0
         self._radio = self.inputs.port(RADIO_TELEGRAMS, stamped(Telegrams.from_cdr), train=train)
         self._localizer = ""
         if self._p.localizer:
@@ -125,8 +126,10 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
         self._state = self.table_out(ATP_STATE, (train,), train=train)
 
     def start_over(self) -> None:
-        """Have no authority."""
-        self._protection = protection_of(self._p)
+        """Have no authority, and greet with nonces that were not used before."""
+        # Built and switched on for the first time it is the same equipment.
+        self._protection = protection_of(self._p, max(0, self._starts - 1))
+        self._starts += 1
 
     def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
         """Judge place and speed by the authority, command the brakes, report the train."""

@@ -32,7 +32,10 @@ def _localizer(
         located[there, LOCALIZER_STATE.index["high_m"]],
     )
     truth_m = front_m[there]
+    # An interval that is not a number holds nothing.
+    holds = (low_m <= truth_m) & (truth_m <= high_m)
     level_m = 0.5 * (high_m - low_m)
+    level_m = level_m[np.isfinite(level_m)]
     return {
         "availability": fraction_of(there, on_line),
         "protected": fraction_of(
@@ -41,7 +44,7 @@ def _localizer(
         **errors_of(located[there, LOCALIZER_STATE.index["front_m"]] - truth_m),
         "protection_level_m": float(np.median(level_m)) if level_m.size else None,
         "protection_level_p95_m": float(np.quantile(level_m, 0.95)) if level_m.size else None,
-        "exceeded": int(np.count_nonzero((truth_m < low_m) | (truth_m > high_m))),
+        "exceeded": int(np.count_nonzero(~holds)),
         "excluded_ticks": int(
             np.count_nonzero(located[there, LOCALIZER_STATE.index["excluded"]] > 0.0)
         ),

@@ -61,13 +61,15 @@ def train_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[st
 class PositionErrors:
     """Positions by phase ranging of one train, arrays over the ticks.
 
-    ``error_m`` and ``bound_m2`` are NaN or infinite where there are none; ``usable`` marks
-    positions on the train's own track.
+    ``error_m`` and ``bound_m2`` are NaN or infinite where there are none. Of the positions that are
+    claimed to be ``known`` some are on a ``wrong_track``; ``usable`` ones are numbers, and on the
+    train's own.
     """
 
     path_m: FloatArray
     on_line: NDArray[np.bool_]
     known: NDArray[np.bool_]
+    wrong_track: NDArray[np.bool_]
     usable: NDArray[np.bool_]
     error_m: FloatArray
     bound_m2: FloatArray
@@ -200,8 +202,10 @@ def _position_errors(
         offsets[recording.tracks.index(leg.track.name)] = leg.path_start_m
     track = np.where(known, position[:, 0], 0.0).astype(int)
     error_m = offsets[track] + position[:, 1] - run.path_m
-    wrong_track = known & np.isnan(offsets[track])
-    for tick in np.flatnonzero(known & ~wrong_track & (track != run.track)):
+    # A track that nobody knows is -1.
+    wrong_track = known & ((track < 0) | np.isnan(offsets[track]))
+    numbers = known & np.isfinite(position[:, 1])
+    for tick in np.flatnonzero(numbers & ~wrong_track & (track != run.track)):
         name = recording.tracks[track[tick]]
         claimed, true = layout_of(scenario).zone_at(name, float(position[tick, 1])), zones[tick]
         assert true is not None
@@ -210,19 +214,19 @@ def _position_errors(
             claimed, true, along_m[tick] - true.start_m < depth_m
         )
     bound_m2 = _bound_m2(scenario, recording, index, run, zones, channel, links)
-    return PositionErrors(run.path_m, run.on_line, known, known & ~wrong_track, error_m, bound_m2)
+    usable = numbers & ~wrong_track
+    return PositionErrors(run.path_m, run.on_line, known, wrong_track, usable, error_m, bound_m2)
 
 
 def _ranging(recording: RunData, index: int, found: PositionErrors) -> dict[str, Any]:
     """Position by phase ranging against the truth and against what the links allow."""
     variance_m2 = recording[POSITION].upto(recording.ticks)[:, index, 2]
     error_m, usable, known = found.error_m, found.usable, found.known
-    wrong_track = known & ~usable
     with np.errstate(invalid="ignore"):
         bounded = usable & np.isfinite(found.bound_m2)
         normalised = error_m[usable] ** 2 / variance_m2[usable]
         allowed_m = _MISLEADING_M + _MISLEADING_SIGMAS * np.sqrt(variance_m2)
-        misleading = wrong_track | (usable & (np.abs(error_m) > allowed_m))
+        misleading = known & ~(usable & (np.abs(error_m) <= allowed_m))
     return {
         "availability": _ratio(int(np.count_nonzero(known)), int(np.count_nonzero(found.on_line))),
         "rmse_m": _rms(error_m[usable]),
@@ -230,7 +234,7 @@ def _ranging(recording: RunData, index: int, found: PositionErrors) -> dict[str,
         "p95_m": _figure(np.quantile(np.abs(error_m[usable]), 0.95)) if usable.any() else None,
         "max_m": _figure(np.max(np.abs(error_m[usable]))) if usable.any() else None,
         "normalised_error": _root_mean(normalised),
-        "wrong_track_ticks": int(np.count_nonzero(wrong_track)),
+        "wrong_track_ticks": int(np.count_nonzero(found.wrong_track)),
         "misleading_ticks": int(np.count_nonzero(misleading)),
     }
 

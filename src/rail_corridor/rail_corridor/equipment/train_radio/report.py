@@ -17,7 +17,10 @@ from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, CBTC_LINKS, RADIO_LINK
 from rail_msgs_py.topics.world import STATE
 from rail_signals.arrays import FloatArray
+from rail_signals.track_code.scales import GRAVITY_MPS2, LEAST_BRAKING_MPS2
+from rail_world.trains.vehicle import Vehicle
 
+from .nodes import steepest_fall_permil
 from .section import CBTC
 from .threat_metrics import forged_authorities, report_metrics
 
@@ -39,7 +42,7 @@ def cbtc_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str
         atp[:, ATP_STATE.index["end_of_authority_m"]], atp[:, ATP_STATE.index["accepted"]]
     )
     speed_mps = np.abs(mine[:, STATE.index["speed_mps"]])
-    passed, withdrawn = _passed(scenario, on_line, front_m, speed_mps, end_m)
+    passed, withdrawn = _passed(scenario, index, on_line, front_m, speed_mps, end_m)
     return {
         "cbtc": _link(scenario, on_line, atp, given, radio, links)
         | report_metrics(scenario, recording, index)
@@ -52,6 +55,7 @@ def cbtc_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str
 
 def _passed(
     scenario: Scenario,
+    index: int,
     on_line: NDArray[np.bool_],
     front_m: FloatArray,
     speed_mps: FloatArray,
@@ -60,25 +64,48 @@ def _passed(
     """Ticks in which a moving train was past its end, and authorities withdrawn.
 
     One is withdrawn if it is cut to where no brake can stop the train any more, as when the wayside
-    finds reports and ranges in disagreement; the train brakes, and until it stands it is not
-    counted as past its end.
+    finds reports and ranges in disagreement. So it is where protection holds none (NaN) any more,
+    as when it was switched on anew; that is not counted as withdrawn. The train brakes, and until
+    it stands it is not counted as past its end, if it is no further than braking may take it.
     """
-    plan = CBTC.of(scenario)
-    braking_mps2 = plan.emergency_mps2 if plan else 1.0
-    delay_s = 3.0 * scenario.tick_s
+    plan, delay_s = CBTC.of(scenario), 3.0 * scenario.tick_s
+    assert plan is not None
+    none = np.isnan(end_m)
+    end_m = np.where(none, -math.inf, end_m)
     passed = withdrawn = 0
     excused = False
+    stands_by_m = -math.inf
     for tick in np.flatnonzero(on_line).tolist():
         v = speed_mps[tick]
-        way_m = v * delay_s + 0.5 * v * v / braking_mps2
-        cut = tick > 0 and end_m[tick] < end_m[tick - 1] - 1.0
+        way_m = v * delay_s + 0.5 * v * v / plan.emergency_mps2
+        appears = tick == 0 or not on_line[tick - 1]
+        cut = none[tick] if appears else end_m[tick] < end_m[tick - 1] - 1.0
         if cut and end_m[tick] < front_m[tick] + way_m:
-            withdrawn += not excused
+            if not excused:
+                withdrawn += not none[tick]
+                stands_by_m = front_m[tick] + _braking_way_m(scenario, index, v)
             excused = True
         elif v == 0.0 or front_m[tick] <= end_m[tick] - way_m:
             excused = False
-        passed += bool(v > 0.0 and front_m[tick] > end_m[tick] and not excused)
+        braking = excused and front_m[tick] <= stands_by_m
+        passed += bool(v > 0.0 and front_m[tick] > end_m[tick] and not braking)
     return passed, withdrawn
+
+
+def _braking_way_m(scenario: Scenario, index: int, speed_mps: float) -> float:
+    """Longest way to a stand: motors pull for the dead time, then the service brake of the plan.
+
+    Both are worse by the steepest fall of the track.
+    """
+    plan, train = CBTC.of(scenario), scenario.trains[index]
+    assert plan is not None
+    fall_mps2 = 1e-3 * GRAVITY_MPS2 * steepest_fall_permil(scenario.network.tracks[train.route[0]])
+    gathered_mps2 = Vehicle(train.vehicle).traction_mps2(0.0) + fall_mps2
+    delay_s = 3.0 * scenario.tick_s
+    fastest_mps = speed_mps + gathered_mps2 * delay_s
+    braked_mps2 = max(plan.braking_mps2 - fall_mps2, LEAST_BRAKING_MPS2)
+    way_m = (speed_mps + 0.5 * gathered_mps2 * delay_s) * delay_s
+    return way_m + 0.5 * fastest_mps * fastest_mps / braked_mps2
 
 
 def _held(end_m: FloatArray, accepted: FloatArray) -> FloatArray:
@@ -152,17 +179,24 @@ def _last(table: FloatArray, column: int) -> float:
 def _location(
     on_line: NDArray[np.bool_], front_m: FloatArray, atp: FloatArray
 ) -> dict[str, float | int | None]:
-    """Where the train believed to be, against the truth."""
+    """Where the train believed to be, against the truth.
+
+    An infinite uncertainty claims nothing; what is no number at all is a false claim.
+    """
     error_m = np.abs(atp[:, ATP_STATE.index["front_m"]] - front_m)
     half_m = atp[:, ATP_STATE.index["uncertainty_m"]]
-    known = on_line & np.isfinite(error_m) & np.isfinite(half_m)
+    heard = ~np.isnan(atp[:, ATP_STATE.index["accepted"]])
+    claimed = on_line & heard & (half_m != math.inf)
+    known = claimed & np.isfinite(error_m) & np.isfinite(half_m)
+    mislocated = int(np.count_nonzero(claimed & ~(error_m <= half_m)))
     if not known.any():
-        return {"located": 0.0, "location_rmse_m": None, "uncertainty_m": None, "mislocated": 0}
+        nothing = {"located": 0.0, "location_rmse_m": None, "uncertainty_m": None}
+        return nothing | {"mislocated": mislocated}
     return {
         "located": float(np.count_nonzero(known) / np.count_nonzero(on_line)),
         "location_rmse_m": float(math.sqrt(np.mean(error_m[known] ** 2))),
         "uncertainty_m": float(np.median(half_m[known])),
-        "mislocated": int(np.count_nonzero(error_m[known] > half_m[known])),
+        "mislocated": mislocated,
     }
 
 

@@ -167,8 +167,10 @@ def tally(
         wrong |= ~healthy.all(axis=1)
         alarmed |= found if fault is None else found & ~begun
         s, v = truth.chainage_m, truth.speed_mps
-        outside = claimed & ((s < estimate.low_m) | (s > estimate.high_m))
-        too_fast = claimed & ((v < estimate.speed_low_mps) | (v > estimate.speed_high_mps))
+        # What is not a number holds nothing.
+        outside = claimed & ~((estimate.low_m <= s) & (s <= estimate.high_m))
+        inside_mps = (estimate.speed_low_mps <= v) & (v <= estimate.speed_high_mps)
+        too_fast = claimed & ~inside_mps
         misled |= outside
         protected = begun & (estimate.status == Status.PROTECTED)
         for name, which in zip(names, (begun, claimed, outside, too_fast, protected), strict=True):

@@ -205,8 +205,8 @@ MUTANTS: list[Mutant] = [
         ("10 cm are rounding", "_ROUNDING_M = 0.011", "_ROUNDING_M = 0.11"),
     ),
     *_group(
-        f"{EQUIPMENT}/doppler/report.py",
-        f"{_REPORTS}/doppler/test_verdicts.py",
+        f"{EQUIPMENT}/localizer/report.py",
+        f"{_REPORTS}/localizer/test_verdicts.py",
         ("exceeded is 0", '"exceeded": int(np.count_nonzero(~holds))', '"exceeded": 0'),
         (
             "an interval that is no number holds",
@@ -220,9 +220,9 @@ MUTANTS: list[Mutant] = [
         ("false reports of the bus are 0", "len(reports) - len(true)", "0"),
     ),
     *_group(
-        f"{CORRIDOR}/report/run_data.py",
+        f"{CORRIDOR}/run_data.py",
         "rail_corridor/report/test_run_data.py",
-        ("no tick is missing", "int(np.count_nonzero(np.logical_or.reduce(gaps)))", "0"),
+        ("no tick is missing", "int(np.count_nonzero(~np.logical_and.reduce(received)))", "0"),
     ),
     # Campaigns.
     *_group(
@@ -472,7 +472,11 @@ MUTANTS: list[Mutant] = [
             "low = np.where(hull, low, np.inf).min(axis=-1)",
             "low = low[..., 0]",
         ),
-        ("any width is given", "middle - low)[S] > self._claim.widest_m", "middle - low)[S] > 1e9"),
+        (
+            "any width is given",
+            "middle - low)[S] <= self._claim.widest_m",
+            "middle - low)[S] <= 1e9",
+        ),
     ),
     *_group(
         f"{LOCALIZER}/integrity_monitor.py",
@@ -493,7 +497,11 @@ MUTANTS: list[Mutant] = [
         f"{ONBOARD}/localizer/located.py",
         "nodes/test_track_code_nodes.py"
         "::test_supervision_judges_the_fastest_that_a_localizer_allows",
-        ("a train is as fast as at least", "max(abs(bound) for bound", "min(abs(bound) for bound"),
+        (
+            "a train is as fast as at least",
+            "max(abs(slowest_mps), abs(fastest_mps))",
+            "min(abs(slowest_mps), abs(fastest_mps))",
+        ),
     ),
 ]
 

@@ -58,7 +58,7 @@ class Protection:
         self.controller = self.new_controller(given)
         self.frames: list[bytes] = []
         self.ticks = 0
-        self.localizer = given["localizer"]
+        self.localizer = given.get("localizer", False)
         if self.localizer:
             self.told = graph.mailbox(TOLD_POSITION, train=TRAIN)
             self._place = graph.sender(LOCALIZER_STATE, train=TRAIN)

@@ -338,7 +338,7 @@ def test_switched_off_it_knows_nothing_and_on_again_it_begins_anew(graph: Any, p
 def test_a_world_without_references_is_one_line(graph: Any, tmp_path: Path) -> None:
     make_plan(load_scenario("plain_line"), tmp_path)
     given = {"world_file": str(tmp_path / "world.json")}
-    with pytest.raises(ParameterError, match="describes no references") as caught:
+    with pytest.raises(ParameterError, match="describes no doppler") as caught:
         ReferenceMediumNode(context=graph.context, parameters=given, services=False)
     assert "\n" not in str(caught.value)
 
@@ -349,7 +349,7 @@ def test_a_world_without_references_is_one_line(graph: Any, tmp_path: Path) -> N
         (ReferenceStationNode, {"slot": 10}, "slot: 10"),
         (ReferenceStationNode, {"tick_s": 0.10001}, "tick_s: 0.10001"),
         (ReferenceStationNode, {"samples": 1000}, "reference tones"),
-        (DopplerPositionerNode, {"station_x_m": (1.0,)}, "doppler_positioner|station"),
+        (DopplerPositionerNode, {"station_x_m": (1.0,)}, "doppler: chainage_m"),
         (DopplerPositionerNode, {"placed_m": 0.0}, "placed_m"),
     ],
 )

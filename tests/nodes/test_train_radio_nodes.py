@@ -41,6 +41,7 @@ from rail_onboard.train_radio.radio_node import CbtcRadioNode
 from rail_signals.train_radio.burst import RadioBurstReceiver
 from rail_signals.train_radio.slots import frame_of
 from rail_wayside.train_radio.base_station_node import BEACON, CbtcBaseStationNode
+from rail_world.train_radio.description import CbtcDescription
 from rail_world.train_radio.medium_node import CbtcMediumNode
 
 TICK_NS = 250_000_000
@@ -323,8 +324,7 @@ class Air:
 
     def __init__(self, graph: Any, plan: Plan, **changes: Any) -> None:
         self.graph = graph
-        described = plan.world.cbtc
-        assert described is not None
+        described = plan.world.part("train_radio", CbtcDescription)
         self.bases = [base.name for base in described.base_stations]
         self.feet_m = {base.name: base.chainage_m for base in described.base_stations}
         self.channel = {base.name: base.channel for base in described.base_stations}
@@ -464,7 +464,7 @@ def test_who_sends_nothing_is_named_and_the_tick_goes_on(graph: Any, plan: Plan)
 def test_a_world_without_train_radio_is_one_line(graph: Any, tmp_path: Path) -> None:
     make_plan(load_scenario("plain_line"), tmp_path)
     given = {"world_file": str(tmp_path / "world.json")}
-    with pytest.raises(ParameterError, match="describes no train radio") as caught:
+    with pytest.raises(ParameterError, match="describes no train_radio") as caught:
         CbtcMediumNode(context=graph.context, parameters=given, services=False)
     assert "\n" not in str(caught.value)
 

@@ -343,7 +343,9 @@ class RunBuilder:
         """Every train stands where it starts, and all that is claimed is true."""
         for index, train in enumerate(self.scenario.trains):
             at_m, name = train.start_m, train.name
-            self.moves(name, at_m).commanded(name).ranged(name, at_m)
+            self.moves(name, at_m).ranged(name, at_m)
+            if COMMAND in self._recording:
+                self.commanded(name)
             if DOPPLER_FIX in self._recording:
                 self.fixed(name, at_m)
             if LOCALIZER_STATE in self._recording:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.equipment.ranging.report import HANDOVER_DEPTH_M
 
 from ...run_builder import RunBuilder, built_in
@@ -64,7 +65,7 @@ def test_a_position_on_a_track_that_does_not_exist_is_on_a_wrong_one() -> None:
 # At the junction of ``branch``, 760 m along main. Where the tracks are apart, zone5 begins on main
 # and zone7 on the branch, both at the station of the junction.
 JUNCTION_M = 760.0
-ON_MAIN, ON_BRANCH = (built_in("branch").layout.zone(name) for name in ("zone5", "zone7"))
+ON_MAIN, ON_BRANCH = (layout_of(built_in("branch")).zone(name) for name in ("zone5", "zone7"))
 
 
 def forked(true_m: float, claimed_m: float, speed_mps: float = 0.0) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from rail_signals.localizer.protection_level import Estimate, Reason, Status
 from rail_signals.localizer.settings import SENSORS, LocalizerSettings, Sensor
 from rail_signals.localizer.study import campaign
 from rail_signals.localizer.study.campaign import Tally, stated_s, tally
-from rail_signals.localizer.study.faults import Kind
+from rail_signals.localizer.study.faults import FaultKind
 from rail_signals.localizer.study.simulation import SimulatedLine, SimulatedMotion, Truth
 
 RUNS, TICKS = 3, 40
@@ -51,14 +51,16 @@ class AlwaysLarge:
 def scripted(script: Script) -> type:
     """A localizer that knows the truth and claims it, but for what a script changes."""
 
-    class Core:
+    class Scripted:
+        rejected = ()
+
         def __init__(self, *_: Any) -> None:
             self._tick = -1
 
         def place(self, *_: Any, **__: Any) -> None:
             pass
 
-        def step(self, *_: Any) -> Estimate:
+        def tick(self, *_: Any) -> Estimate:
             self._tick += 1
             s, v = Watched.truth.chainage_m, Watched.truth.speed_mps
             told: dict[str, Any] = {
@@ -78,7 +80,7 @@ def scripted(script: Script) -> type:
             script(self._tick, told)
             return Estimate(**told)
 
-    return Core
+    return Scripted
 
 
 @pytest.fixture
@@ -88,8 +90,8 @@ def count(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Tally]:
     def of(script: Script, *, faulty: bool = True, ticks: int = TICKS) -> Tally:
         monkeypatch.setattr(campaign, "SimulatedMotion", Watched)
         monkeypatch.setattr(campaign, "SensorFault", AlwaysLarge)
-        monkeypatch.setattr(campaign, "LocalizerCore", scripted(script))
-        fault = (Sensor.RANGE, Kind.JUMP) if faulty else (None, None)
+        monkeypatch.setattr(campaign, "Localizer", scripted(script))
+        fault = (Sensor.RANGE, FaultKind.JUMP) if faulty else (None, None)
         return tally(
             LocalizerSettings(),
             replace(LINE, outages_per_s=0.0),
@@ -110,7 +112,7 @@ def truthful(_: int, __: dict[str, Any]) -> None:
 def test_who_claims_the_truth_is_blamed_for_nothing_but_silence(count: Any) -> None:
     counted = count(truthful)
     assert counted.positions == counted.claimed == counted.protected == RUNS * (TICKS - BEGINS)
-    assert counted.exceeded == counted.speed_exceeded == counted.exceeding_runs == 0
+    assert counted.misleading == counted.misleading_speeds == counted.misleading_runs == 0
     assert counted.false_alarms == counted.wrong_exclusions == 0
     assert counted.healthy_s == pytest.approx(RUNS * BEGINS * TICK_S)
 
@@ -136,9 +138,9 @@ def test_levels_exceeded_are_counted_and_the_runs_too(
             told[name][2] += shift_m
 
     counted = count(script)
-    assert counted.exceeded == exceeded
-    assert counted.exceeding_runs == (2 if exceeded else 0)
-    assert counted.speed_exceeded == 0
+    assert counted.misleading == exceeded
+    assert counted.misleading_runs == (2 if exceeded else 0)
+    assert counted.misleading_speeds == 0
 
 
 @pytest.mark.parametrize(
@@ -159,7 +161,7 @@ def test_speeds_exceeded_are_counted(
             told[name][1] += shift_mps
 
     counted = count(script)
-    assert (counted.speed_exceeded, counted.exceeded) == (exceeded, 0)
+    assert (counted.misleading_speeds, counted.misleading) == (exceeded, 0)
 
 
 def test_what_is_not_claimed_is_not_exceeded(count: Any) -> None:
@@ -171,8 +173,8 @@ def test_what_is_not_claimed_is_not_exceeded(count: Any) -> None:
         told["uncovered"][2, Sensor.DOPPLER] = True
 
     counted = count(script)
-    assert counted.claimed == counted.exceeded == TICKS - BEGINS
-    assert counted.exceeding_runs == 1
+    assert counted.claimed == counted.misleading == TICKS - BEGINS
+    assert counted.misleading_runs == 1
 
 
 def test_a_fault_that_is_found_before_there_is_one_is_a_false_alarm(count: Any) -> None:
@@ -199,7 +201,7 @@ def test_the_exclusion_of_a_healthy_sensor_is_wrong(count: Any) -> None:
 @pytest.mark.parametrize(("waits", "late"), [(50, 0), (51, RUNS)])
 def test_a_fault_is_found_late_after_the_stated_time(count: Any, waits: int, late: int) -> None:
     # 5 s of readings from the first that is off by much, which is that of the first tick.
-    assert stated_s(Sensor.RANGE, Kind.JUMP) == 5.0
+    assert stated_s(Sensor.RANGE, FaultKind.JUMP) == 5.0
 
     def script(tick: int, told: dict[str, Any]) -> None:
         told["found"][:] = tick >= BEGINS + waits

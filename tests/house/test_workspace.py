@@ -54,5 +54,5 @@ def test_colcon_builds_the_workspace(tmp_path: Path) -> None:
         assert (share / package / "package.xml").is_file()
         assert (share / "ament_index" / "resource_index" / "packages" / package).is_file()
     assert list(
-        install.glob("rail_corridor/lib/python*/site-packages/**/scenario/builtin/demo.yaml")
+        install.glob("rail_corridor/lib/python*/site-packages/**/loading/builtin/demo.yaml")
     )

@@ -15,10 +15,11 @@ from rail_msgs_py.topics.topic import Topic
 from rail_world.line.description import Description
 from rail_world.line.drawing import Drawing
 
+from .live import LiveView
 from .node_spec import NodeKind, NodeSpec
 
 if TYPE_CHECKING:
-    from rail_corridor.view.cards import CardSource
+    from .run_figures import RunFigures
 
 
 @dataclass(frozen=True)
@@ -171,6 +172,10 @@ class Subsystem:
         """What the report shows of it on the screen."""
         return ()
 
-    def cards(self) -> Sequence[CardSource]:
-        """Cards of the live page, for each train."""
-        return ()
+    def live(self) -> LiveView:
+        """What it shows on the live page; made once, and only by those who draw it."""
+        return LiveView()
+
+    def run_figures(self) -> RunFigures | None:
+        """What it adds to the figures of a run; made only by those who draw them."""
+        return None

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.position_errors import position_table
 from rail_corridor.equipment.subsystem import PlanContext, SectionOption, Subsystem
@@ -102,6 +103,12 @@ class Doppler(Subsystem):
         table = position_table("positions on board by Doppler shifts", report["trains"], "doppler")
         if table is not None:
             yield table
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import DopplerView  # wanted by the live page only
+
+        return DopplerView()
 
 
 DOPPLER: Final = Doppler()

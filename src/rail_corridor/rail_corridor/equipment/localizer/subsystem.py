@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.one_way import check_one_way
 from rail_corridor.equipment.position_errors import position_table
@@ -69,6 +70,12 @@ class Localizer(Subsystem):
         table = position_table(title, report["trains"], "localizer", *more)
         if table is not None:
             yield table
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import LocalizerView  # wanted by the live page only
+
+        return LocalizerView()
 
 
 LOCALIZER: Final = Localizer()

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext, SectionOption, Subsystem
 from rail_corridor.run_data import FloatArray, RecordSpec, RunData, in_one_message, per_train
@@ -136,6 +137,12 @@ class Ranging(Subsystem):
     def tables(self, report: Mapping[str, Any]) -> Iterable[RenderableType]:
         """See `Subsystem.tables`."""
         yield ranging_table(report)
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import RangingView  # wanted by the live page only
+
+        return RangingView()
 
 
 RANGING: Final = Ranging()

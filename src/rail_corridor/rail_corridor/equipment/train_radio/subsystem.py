@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext, Subsystem, Supervision
 from rail_corridor.run_data import RecordSpec, RunData, in_one_message, per_train
@@ -142,6 +143,12 @@ class TrainRadio(Subsystem):
         line = threat_line(report)
         if line is not None:
             yield line
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import TrainRadioView  # wanted by the live page only
+
+        return TrainRadioView()
 
 
 TRAIN_RADIO: Final = TrainRadio()

@@ -1,6 +1,6 @@
 // The line to scale: as a strip along the chainage, or as a map.
 
-import { engineering, font, levels, pairColours, prepare, theme, ticks } from '/assets/theme.js';
+import { engineering, font, groupColours, levels, prepare, theme, ticks } from '/assets/theme.js';
 
 const SIDE = 14; // px kept free to either side
 
@@ -41,16 +41,16 @@ export function drawStrip(canvas, line, frame, options) {
   const from = offsets(line);
   const whole = extent(line);
   const rows = line.tracks || [];
-  const circuits = (line.circuits || []).length > 0;
-  const bases = (line.bases || []).length > 0;
-  const references = (line.references || []).length > 0;
-  const rowHeight = 110 + (circuits ? 22 : 0) + (bases ? 16 : 0) + (references ? 16 : 0);
+  const onTrack = (line.rows || []).filter((row) => row.on_track);
+  const below = (line.rows || []).filter((row) => !row.on_track);
+  const rowHeight = 110 + below.reduce((sum, row) => sum + heightOf(row), 0);
   const { pen, width, height } = prepare(canvas, rows.length * rowHeight + 30);
   const span = options.span_m || whole;
   const first = options.span_m ? options.centre_m - span / 2 : 0;
   const scale = (width - 2 * SIDE) / span;
   const x = (u) => SIDE + (u - first) * scale;
-  const pairs = pairColours(line.zones || []);
+  const groups = groupColours(line);
+  const out = new Set([...(frame.off || []), ...(frame.failed || [])]);
   const hits = [];
   axis(pen, colours, x, first, first + span, width, height, rows.length * rowHeight);
   rows.forEach((track, row) => {
@@ -66,12 +66,18 @@ export function drawStrip(canvas, line, frame, options) {
     pen.fillRect(labelX - 3, top + 2, pen.measureText(label).width + 6, 15);
     pen.fillStyle = colours.soft;
     pen.fillText(label, labelX, top + 13);
-    zones(pen, colours, line, track, u0, x, yBar, width, pairs, options);
-    stations(pen, colours, line, frame, track, u0, x, yBar, width);
+    const place = { track, u0, x, width, out };
+    bed(pen, colours, onTrack, yBar, place);
+    for (const each of onTrack) {
+      coloured(pen, each, groups, yBar, place);
+      posts(pen, colours, each, stateOf(frame, each), yBar, place);
+    }
     let y = yBar + 36;
-    if (circuits) { drawCircuits(pen, colours, line, frame, track, u0, x, y, width); y += 22; }
-    if (bases) { drawBases(pen, colours, line.bases, 'cbtc', triangle, frame, track, u0, x, y, width); y += 16; }
-    if (references) drawBases(pen, colours, line.references, 'reference', diamond, frame, track, u0, x, y, width);
+    for (const each of below) {
+      stretches(pen, colours, each, stateOf(frame, each), y, place);
+      marks(pen, colours, each, stateOf(frame, each), y, place);
+      y += heightOf(each);
+    }
     trains(pen, colours, line, frame, track, u0, x, top, scale, options, hits, width);
   });
   canvas.dataset.trains = hits.length;
@@ -103,24 +109,36 @@ function junction(pen, colours, at, yBar, rowHeight) {
   pen.setLineDash([]);
 }
 
-function zones(pen, colours, line, track, u0, x, y, width, pairs, options) {
-  pen.fillStyle = colours.line;
-  const starts = (line.zones || []).filter((zone) => zone.track === track.name).map((zone) => zone.start_m);
+const heightOf = (row) => (row.stretches.length ? 22 : 16);
+
+// State of each element of a row by its name: [word, active, tone].
+function stateOf(frame, row) {
+  return new Map(Object.entries((frame.states || {})[row.name] || {}));
+}
+
+// The track itself, up to where something is drawn onto it.
+function bed(pen, colours, rows, y, { track, u0, x, width }) {
+  const starts = rows.flatMap((row) => row.stretches).filter((each) => each.track === track.name).map((each) => each.start_m);
   const left = Math.max(0, x(u0));
   const right = Math.min(width, x(u0 + (starts.length ? Math.min(...starts) : track.length_m)));
+  pen.fillStyle = colours.line;
   pen.fillRect(left, y + 6, Math.max(0, right - left), 4);
-  for (const zone of line.zones || []) {
-    if (zone.track !== track.name) continue;
-    const [a, b] = [x(u0 + zone.start_m), x(u0 + zone.end_m)];
+}
+
+// Stretches drawn onto the track in the colours of their groups.
+function coloured(pen, row, groups, y, { track, u0, x, width }) {
+  for (const stretch of row.stretches) {
+    if (stretch.track !== track.name) continue;
+    const [a, b] = [x(u0 + stretch.start_m), x(u0 + stretch.end_m)];
     if (b < 0 || a > width) continue;
-    const pair = pairs.get(zone.downlink);
-    pen.fillStyle = pair.colour;
+    const group = groups.get(stretch.group || 0);
+    pen.fillStyle = group.colour;
     pen.fillRect(a + 0.5, y, Math.max(1, b - a - 1), 16);
     const [shownA, shownB] = [Math.max(a, 0), Math.min(b, width)];
     pen.font = font(11, true);
-    const text = shownB - shownA > 120 ? `${zone.name}: ${pair.label}` : pair.label;
+    const text = shownB - shownA > 120 ? `${stretch.name}: ${group.label}` : group.label;
     if (pen.measureText(text).width + 8 < shownB - shownA) {
-      pen.fillStyle = pair.text;
+      pen.fillStyle = group.text;
       pen.textAlign = 'center';
       pen.fillText(text, (shownA + shownB) / 2, y + 12.5);
       pen.textAlign = 'left';
@@ -128,29 +146,31 @@ function zones(pen, colours, line, track, u0, x, y, width, pairs, options) {
   }
 }
 
-function stations(pen, colours, line, frame, track, u0, x, y, width) {
-  const out = new Set([...(frame.off || []), ...(frame.failed || [])]);
-  const found = (line.stations || []).filter((s) => s.track === track.name
-    || (line.zones || []).some((z) => z.station === s.name && z.track === track.name));
+// Marks that stand on the track, their names below it where there is room.
+function posts(pen, colours, row, states, y, { track, u0, x, width, out }) {
   pen.font = font(11);
   let last = -Infinity;
-  for (const station of found) {
-    const zone = (line.zones || []).find((z) => z.station === station.name && z.track === track.name);
-    const at = x(u0 + (station.track === track.name || !zone ? station.at_m : zone.start_m));
-    if (at < -20 || at > width + 20) continue;
-    const dead = out.has(`/wayside/${station.name}`);
-    pen.fillStyle = dead ? colours.bad : colours.ink;
+  for (const mark of row.marks) {
+    const at = x(u0 + mark.at_m);
+    if (mark.track !== track.name || at < -20 || at > width + 20) continue;
+    const { bad, text } = wording(mark, states, out);
+    pen.fillStyle = bad ? colours.bad : colours.ink;
     pen.fillRect(at - 1, y + 16, 2, 7);
-    if (dead) cross(pen, at, y + 8, 7, colours.bad);
-    const text = dead ? `${station.name} off` : station.name;
+    if (out.has(mark.node)) cross(pen, at, y + 8, 7, colours.bad);
     const half = pen.measureText(text).width / 2;
-    if (at - half > last + 6 || dead) {
+    if (at - half > last + 6 || bad) {
       pen.textAlign = 'center';
       pen.fillText(text, Math.max(half + 2, Math.min(width - half - 2, at)), y + 34);
       pen.textAlign = 'left';
       last = at + half;
     }
   }
+}
+
+// Name of a mark with the word for its state; one whose node is off or failed is off.
+function wording(mark, states, out) {
+  const [word, , tone] = out.has(mark.node) ? ['off', true, 'bad'] : states.get(mark.name) || ['', false, ''];
+  return { bad: tone === 'bad', text: word ? `${mark.name} ${word}` : mark.name };
 }
 
 function cross(pen, x, y, size, colour) {
@@ -162,21 +182,22 @@ function cross(pen, x, y, size, colour) {
   pen.stroke();
 }
 
-function drawCircuits(pen, colours, line, frame, track, u0, x, y, width) {
-  const state = new Map((frame.circuits || []).map((c) => [c.name, c.occupied]));
-  for (const circuit of line.circuits) {
-    if (circuit.track !== track.name) continue;
-    const [a, b] = [x(u0 + circuit.start_m), x(u0 + circuit.end_m)];
+// A row of stretches below the track: outlines, filled where they are active.
+function stretches(pen, colours, row, states, y, { track, u0, x, width }) {
+  for (const stretch of row.stretches) {
+    if (stretch.track !== track.name) continue;
+    const [a, b] = [x(u0 + stretch.start_m), x(u0 + stretch.end_m)];
     if (b < 0 || a > width) continue;
-    const occupied = state.get(circuit.name);
-    pen.strokeStyle = pen.fillStyle = colours.soft;
+    const [word, active, tone] = states.get(stretch.name) || ['', false, ''];
+    const colour = tone === 'bad' ? colours.bad : colours.ink;
+    pen.strokeStyle = colours.soft;
     pen.lineWidth = 1;
     pen.strokeRect(a + 1.5, y + 4.5, Math.max(1, b - a - 3), 7);
-    if (occupied) { pen.fillStyle = colours.ink; pen.fillRect(a + 1, y + 4, Math.max(1, b - a - 2), 8); }
+    if (active) { pen.fillStyle = colour; pen.fillRect(a + 1, y + 4, Math.max(1, b - a - 2), 8); }
     pen.font = font(10);
-    const text = occupied ? `${circuit.name} occupied` : circuit.name;
+    const text = word ? `${stretch.name} ${word}` : stretch.name;
     if (pen.measureText(text).width + 10 < b - a) {
-      pen.fillStyle = occupied ? colours.ink : colours.soft;
+      pen.fillStyle = word ? colour : colours.soft;
       pen.textAlign = 'center';
       pen.fillText(text, (a + b) / 2, y + 22);
       pen.textAlign = 'left';
@@ -184,27 +205,29 @@ function drawCircuits(pen, colours, line, frame, track, u0, x, y, width) {
   }
 }
 
-function triangle(pen, at, y) {
-  pen.beginPath(); pen.moveTo(at, y + 1); pen.lineTo(at - 5, y + 11); pen.lineTo(at + 5, y + 11); pen.fill();
-}
+const SYMBOLS = {
+  tick(pen, at, y) { pen.fillRect(at - 1, y + 1, 2, 10); },
+  triangle(pen, at, y) {
+    pen.beginPath(); pen.moveTo(at, y + 1); pen.lineTo(at - 5, y + 11); pen.lineTo(at + 5, y + 11); pen.fill();
+  },
+  diamond(pen, at, y) {
+    pen.beginPath(); pen.moveTo(at, y + 1); pen.lineTo(at - 5, y + 6); pen.lineTo(at, y + 11); pen.lineTo(at + 5, y + 6); pen.fill();
+  },
+  circle(pen, at, y) { pen.beginPath(); pen.arc(at, y + 6, 4.5, 0, 7); pen.fill(); },
+  square(pen, at, y) { pen.fillRect(at - 4, y + 2, 8, 8); },
+};
 
-function diamond(pen, at, y) {
-  pen.beginPath(); pen.moveTo(at, y + 1); pen.lineTo(at - 5, y + 6); pen.lineTo(at, y + 11); pen.lineTo(at + 5, y + 6); pen.fill();
-}
-
-// Base stations of the train radio, or reference stations of the Doppler positions.
-function drawBases(pen, colours, all, node, sign, frame, track, u0, x, y, width) {
-  const out = new Set([...(frame.off || []), ...(frame.failed || [])]);
+// A row of marks below the track, each with its name.
+function marks(pen, colours, row, states, y, { track, u0, x, width, out }) {
+  const sign = SYMBOLS[row.symbol] || SYMBOLS.tick;
   pen.font = font(10);
-  for (const base of all) {
-    if (base.track !== track.name) continue;
-    const at = x(u0 + base.at_m);
-    if (at < 0 || at > width) continue;
-    const dead = out.has(`/wayside/${base.name}/${node}`);
-    pen.fillStyle = dead ? colours.bad : colours.soft;
+  for (const mark of row.marks) {
+    const at = x(u0 + mark.at_m);
+    if (mark.track !== track.name || at < 0 || at > width) continue;
+    const { bad, text } = wording(mark, states, out);
+    pen.fillStyle = bad ? colours.bad : colours.soft;
     sign(pen, at, y);
-    if (dead) cross(pen, at, y + 7, 6, colours.bad);
-    const text = dead ? `${base.name} off` : base.name;
+    if (out.has(mark.node)) cross(pen, at, y + 7, 6, colours.bad);
     const room = pen.measureText(text).width + 8;
     pen.fillText(text, at + room > width ? at - room : at + 8, y + 11);
   }
@@ -237,8 +260,9 @@ function trains(pen, colours, line, frame, track, u0, x, top, scale, options, hi
       }
     }
     body(pen, colours, at, y, about, train, place, scale, picked, width);
-    const located = train.located;
-    if (located && located.at_m != null && located.track === track.name) interval(pen, colours, x(u0 + located.low_m), x(u0 + located.high_m), y - 11);
+    for (const claim of train.intervals || []) {
+      if (claim.track === track.name) interval(pen, colours, x(u0 + claim.low_m), x(u0 + claim.high_m), y - 11);
+    }
     if (train.true && train.true[0] === track.name) {
       const truth = x(u0 + train.true[1]);
       pen.fillStyle = colours.truth;
@@ -284,10 +308,10 @@ function body(pen, colours, at, y, about, train, place, scale, picked, width) {
   if (place.known) pen.fill(); else pen.stroke();
 }
 
-// The interval in which the localizer says the train is.
+// An interval that is claimed to hold the train.
 function interval(pen, colours, low, high, y) {
   if (high - low < 3) return;
-  pen.strokeStyle = colours.located;
+  pen.strokeStyle = colours.claim;
   pen.lineWidth = 2;
   pen.beginPath();
   pen.moveTo(low, y - 4); pen.lineTo(low, y + 4);
@@ -346,13 +370,16 @@ export function drawMap(canvas, line, frame, options) {
     chain.forEach((p, k) => (k ? pen.lineTo(toX(p[0]), toY(p[1])) : pen.moveTo(toX(p[0]), toY(p[1]))));
     pen.stroke();
   };
-  const pairs = pairColours(line.zones || []);
+  const groups = groupColours(line);
   for (const track of line.tracks || []) stroke(track.name, 0, track.length_m, colours.line, 2);
-  for (const zone of line.zones || []) stroke(zone.track, zone.start_m, zone.end_m, pairs.get(zone.downlink).colour, 7);
+  for (const each of (line.rows || []).filter((row) => row.on_track).flatMap((row) => row.stretches)) {
+    stroke(each.track, each.start_m, each.end_m, groups.get(each.group || 0).colour, 7);
+  }
   pen.font = font(11);
   const names = [];
-  for (const station of line.stations || []) {
-    const [px, py] = [toX(station.position_m[0]), toY(station.position_m[1])];
+  for (const mark of (line.rows || []).flatMap((row) => row.marks)) {
+    if (!mark.map_m) continue;
+    const [px, py] = [toX(mark.map_m[0]), toY(mark.map_m[1])];
     pen.fillStyle = colours.ink;
     pen.beginPath(); pen.arc(px, py, 2.5, 0, 7); pen.fill();
     if (names.every(([nx, ny]) => Math.hypot(nx - px, ny - py) > 46)) {
@@ -360,8 +387,8 @@ export function drawMap(canvas, line, frame, options) {
       pen.strokeStyle = colours.paper;
       pen.lineWidth = 4;
       pen.textAlign = 'center';
-      pen.strokeText(station.name, px, py + 20);
-      pen.fillText(station.name, px, py + 20);
+      pen.strokeText(mark.name, px, py + 20);
+      pen.fillText(mark.name, px, py + 20);
       names.push([px, py]);
     }
   }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from rich.console import RenderableType
 
@@ -16,10 +16,9 @@ from rail_world.line.description import Description
 from rail_world.line.drawing import Drawing
 
 from .live import LiveView
+from .map_scene import MapMarkers, MapScene
 from .node_spec import NodeKind, NodeSpec
-
-if TYPE_CHECKING:
-    from .run_figures import RunFigures
+from .run_figures import RunFigures
 
 
 @dataclass(frozen=True)
@@ -176,6 +175,10 @@ class Subsystem:
         """What it shows on the live page; made once, and only by those who draw it."""
         return LiveView()
 
-    def run_figures(self) -> RunFigures | None:
+    def map_markers(self, scene: MapScene) -> MapMarkers:
+        """What it adds to the trains in RViz and Foxglove."""
+        return MapMarkers()
+
+    def run_figures(self) -> RunFigures:
         """What it adds to the figures of a run; made only by those who draw them."""
-        return None
+        return RunFigures()

@@ -8,15 +8,15 @@ from typing import Any
 
 from std_msgs.msg import Header
 
+from rail_corridor.equipment.map_scene import MapScene
 from rail_corridor.plan.plan import REPORT, Plan
-from rail_corridor.run_data import RunData
+from rail_corridor.run_data import FloatArray, RunData
 from rail_msgs_py.failures import failure
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.stamps import NANOSECONDS
-from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
-from rail_msgs_py.topics.ranging import POSITION
 from rail_msgs_py.topics.tick import FAILED, OBSERVED
+from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.world import STATE, TRAIN_MARKERS
 
 from .intake import Intake
@@ -124,12 +124,11 @@ class Observer(CorridorNode):
         if tick < 0:
             return
         recording = self.intake.recording
-        records = [recording[STATE], recording[POSITION]]
-        if LOCALIZER_STATE in recording:
-            records.append(recording[LOCALIZER_STATE])
-        rows = [record.upto(tick + 1)[tick] for record in records]
-        stamp_ns = tick * self._tick_ns
-        markers = train_markers(
-            stamp_ns, recording.trains, self._network, *rows, first_tracks=self._first_tracks
+
+        def table(topic: Topic) -> FloatArray | None:
+            return recording[topic].upto(tick + 1)[tick] if topic in recording else None
+
+        scene = MapScene(
+            tick * self._tick_ns, recording.trains, self._network, self._first_tracks, table
         )
-        self._markers.publish(markers)
+        self._markers.publish(train_markers(scene))

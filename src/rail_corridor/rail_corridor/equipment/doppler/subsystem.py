@@ -10,6 +10,7 @@ from rich.console import RenderableType
 from rail_corridor.equipment.live import LiveView
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.position_errors import position_table
+from rail_corridor.equipment.run_figures import RunFigures
 from rail_corridor.equipment.subsystem import PlanContext, SectionOption, Subsystem
 from rail_corridor.run_data import RecordSpec, RunData, per_train
 from rail_corridor.scenario.model import Scenario
@@ -109,6 +110,12 @@ class Doppler(Subsystem):
         from .cards import DopplerView  # wanted by the live page only
 
         return DopplerView()
+
+    def run_figures(self) -> RunFigures:
+        """See `Subsystem.run_figures`."""
+        from .run_figures import DopplerFigures  # wanted by the figures only
+
+        return DopplerFigures()
 
 
 DOPPLER: Final = Doppler()

@@ -115,7 +115,7 @@ export const template = `
 
         <div v-if="tab === 'distance'">
           <div class="cv-row">
-            <div class="cv-legend"><span><b class="sign path picked"></b>{{ train || 'picked train' }}</span><span><b class="sign path"></b>other trains, as measured</span><span><b class="sign path thin"></b>truth</span><span>edge: channel pair of the zone</span></div>
+            <div class="cv-legend"><span><b class="sign path picked"></b>{{ train || 'picked train' }}</span><span><b class="sign path"></b>other trains, as measured</span><span><b class="sign path thin"></b>truth</span><span v-if="groups.size">edge: colours as on the line</span></div>
             <div class="cv-fill"></div>
             <q-btn-toggle v-model="last" unelevated no-caps padding="1px 9px" size="12px" toggle-color="primary" :options="[{label: 'all', value: 0}, {label: 'last 5 min', value: 300}, {label: 'last min', value: 60}]"></q-btn-toggle>
           </div>

@@ -323,5 +323,6 @@ def test_every_scenario_announces_itself(name: str) -> None:
     assert line["name"] == name
     assert [train["name"] for train in line["trains"]] == list(corridor.names)
     assert parse_scenario(line["scenario"]).to_json() == corridor.scenario.to_json()
+    assert all(fault["subject"] for fault in line["faults"])
     # The page needs what follows from it alone.
     assert "scenario" not in corridor.frame()["line"]

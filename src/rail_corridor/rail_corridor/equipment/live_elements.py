@@ -227,7 +227,7 @@ class TrackStretch:
     track: str
     start_m: float
     end_m: float
-    group: int = 0
+    group: int | None = None
     group_label: str = ""
 
 

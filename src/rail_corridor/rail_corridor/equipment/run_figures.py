@@ -26,7 +26,8 @@ class FigureData:
     @property
     def times_s(self) -> FloatArray:
         """Time of each tick."""
-        return np.arange(1, self.data.ticks + 1) * float(self.scenario.tick_s)
+        times_s: FloatArray = np.arange(1, self.data.ticks + 1) * self.scenario.tick_s
+        return times_s
 
     def states(self, train: int) -> FloatArray:
         """State of a train [tick, column of `STATE`], NaN while it is not on the line."""

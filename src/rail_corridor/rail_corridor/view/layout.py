@@ -39,5 +39,5 @@ def _row(row: LineRow) -> dict[str, Any]:
     """A row without what it leaves empty, since a long line has many elements."""
     found = asdict(row)
     for key in ("marks", "stretches"):
-        found[key] = [{k: v for k, v in each.items() if v or v == 0.0} for each in found[key]]
+        found[key] = [{k: v for k, v in each.items() if v not in (None, "")} for each in found[key]]
     return found

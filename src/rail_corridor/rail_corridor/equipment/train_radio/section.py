@@ -143,7 +143,7 @@ class NetworkThreats(TimedFault):
     @property
     def subject(self) -> str:
         """The threats."""
-        return ", ".join(self.threats)
+        return ", ".join(threat.value for threat in self.threats)
 
 
 CBTC: Final[Section[CbtcPlan | None]] = Section(

@@ -2,7 +2,8 @@
 // Vue and Quasar come with NiceGUI; nothing is fetched from anywhere else.
 
 import { drawError, drawTimeDistance } from '/assets/chart.js';
-import { drawMap, drawStrip, extent, offsets, placeOf } from '/assets/line.js';
+import { drawStrip, extent, offsets, placeOf } from '/assets/line.js';
+import { drawMap } from '/assets/map.js';
 import { drawPlane, drawSpectrum, drawTime } from '/assets/scope.js';
 import { clock, engineering, groupColours } from '/assets/theme.js';
 import { template } from '/assets/template.js';

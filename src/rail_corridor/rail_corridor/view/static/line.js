@@ -75,7 +75,7 @@ export function drawStrip(canvas, line, frame, options) {
     let y = yBar + 36;
     for (const each of below) {
       stretches(pen, colours, each, stateOf(frame, each), y, place);
-      marks(pen, colours, each, stateOf(frame, each), y, place);
+      marks(pen, colours, each, stateOf(frame, each), y + (each.stretches.length ? 22 : 0), place);
       y += heightOf(each);
     }
     trains(pen, colours, line, frame, track, u0, x, top, scale, options, hits, width);
@@ -109,7 +109,8 @@ function junction(pen, colours, at, yBar, rowHeight) {
   pen.setLineDash([]);
 }
 
-const heightOf = (row) => (row.stretches.length ? 22 : 16);
+// Marks stand below the stretches of their row.
+const heightOf = (row) => (row.stretches.length ? 22 : 0) + (row.marks.length ? 16 : 0);
 
 // State of each element of a row by its name: [word, active, tone].
 function stateOf(frame, row) {

@@ -26,8 +26,8 @@ class FigureData:
     @property
     def times_s(self) -> FloatArray:
         """Time of each tick."""
-        times_s: FloatArray = np.arange(1, self.data.ticks + 1) * self.scenario.tick_s
-        return times_s
+        ticks = np.arange(1, self.data.ticks + 1)
+        return np.asarray(ticks * self.scenario.tick_s, dtype=np.float64)
 
     def states(self, train: int) -> FloatArray:
         """State of a train [tick, column of `STATE`], NaN while it is not on the line."""

@@ -75,6 +75,7 @@ def test_a_position_in_all_its_forms(place: Position) -> None:
         stamp_ns, track, figures = position.figures_from_cdr(raw)
         read = Position(stamp_ns, place.train, track, *figures)
         assert same(read, place)
+        assert same(Position.from_cdr(raw), place)
 
 
 def test_a_position_writer_leaves_nothing_of_the_last_one() -> None:

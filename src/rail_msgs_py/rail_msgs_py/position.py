@@ -86,6 +86,26 @@ class Position:
             float(message.twist.covariance[0]),
         )
 
+    @classmethod
+    def from_cdr(cls, raw: bytes) -> Position:
+        """View of a serialised message."""
+        stamp_ns, track, values = figures_from_cdr(raw)
+        # The name behind that of the track, which ends in a zero byte and is filled up to four.
+        at = _HEAD.size + -(-(len(track.encode()) + 1) // 4) * 4
+        length = int.from_bytes(raw[at : at + 4], "little")
+        train = raw[at + 4 : at + 3 + length].decode()
+        return cls(stamp_ns, train, track, *values)
+
+    def describe(self) -> str:
+        """In words, without the time."""
+        line = f"{self.train} on {self.track}: "
+        if not self.known:
+            return f"{line}not known (last {self.chainage_m:.1f} m)"
+        return (
+            f"{line}{self.chainage_m:.3f} m ± {math.sqrt(self.variance_m2):.3f} m, "
+            f"{self.speed_mps * 3.6:.1f} km/h"
+        )
+
 
 class PositionWriter:
     """Serialises the positions of one train on one track: only stamp and figures change."""

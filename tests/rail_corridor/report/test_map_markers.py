@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 from visualization_msgs.msg import Marker
 
+from rail_corridor.equipment.map_scene import MapScene
 from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plan.plan import make_plan
 from rail_corridor.report.map_markers import train_markers
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
+from rail_msgs_py.topics.ranging import POSITION
+from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.world import STATE
+from rail_signals.arrays import FloatArray
 from rail_signals.localizer.protection_level import Status
 from rail_world.line.corridor_map import PAIR_COLOURS, markers
 
@@ -20,6 +24,17 @@ from rail_world.line.corridor_map import PAIR_COLOURS, markers
 @pytest.fixture(scope="module")
 def scenario() -> Scenario:
     return load_scenario("demo")
+
+
+def scene_of(
+    scenario: Scenario, names: tuple[str, ...], tables: dict[str, FloatArray], stamp_ns: int = 0
+) -> MapScene:
+    first_tracks = ("main",) * len(names)
+
+    def table(topic: Topic) -> FloatArray | None:
+        return tables.get(topic.pattern)
+
+    return MapScene(stamp_ns, names, scenario.network, first_tracks, table)
 
 
 def test_a_train_stands_where_it_is_and_where_it_is_thought_to_be(scenario: Scenario) -> None:
@@ -30,7 +45,8 @@ def test_a_train_stands_where_it_is_and_where_it_is_thought_to_be(scenario: Scen
     state[0, 9] = state[1, 9] = 1.0
     position = np.array([[1, 203.0, 4.0, 20.0], [0, 5.0, np.inf, 0.0], [np.nan] * 4])
     names = ("train_a", "train_b", "train_c")
-    found = train_markers(3_500_000_000, names, scenario.network, state, position).markers
+    tables = {STATE.pattern: state, POSITION.pattern: position}
+    found = train_markers(scene_of(scenario, names, tables, 3_500_000_000)).markers
     by = {(marker.ns, marker.id): marker for marker in found}
     assert {marker.header.frame_id for marker in found} == {"map"}
     assert by["truth", 0].header.stamp.nanosec == 500_000_000
@@ -58,11 +74,10 @@ def test_the_interval_of_the_localizer_lies_along_the_track(
     row = {"status": float(status), "front_m": 700.0, "low_m": 690.0, "high_m": 712.0}
     located = np.array([[row.get(column, 0.0) for column in LOCALIZER_STATE.columns]] * 2)
     located[1, [0, 5, 6]] = (0.0, -np.inf, np.inf)
-    found = train_markers(
-        *(0, ("train_a", "train_b"), scenario.network, state, np.full((2, 4), np.nan)),
-        located=located,
-        first_tracks=("main", "main"),
-    ).markers
+    tables = {STATE.pattern: state, LOCALIZER_STATE.pattern: located}
+    found = train_markers(scene_of(scenario, ("train_a", "train_b"), tables)).markers
+    texts = [marker.text for marker in found if marker.ns == "name"]
+    assert texts == ["train_a", "train_b"]
     line, none = [marker for marker in found if marker.ns == "interval"]
     steps = np.diff([(p.x, p.y) for p in line.points], axis=0)
     assert np.hypot(*steps.T).sum() == pytest.approx(22.0, abs=0.01)

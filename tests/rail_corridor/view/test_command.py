@@ -10,7 +10,8 @@ from collections.abc import Iterator
 import pytest
 
 from rail_corridor.errors import InputError
-from rail_corridor.view.command import bind, is_loopback, run_view
+from rail_corridor.view.address import bind, is_loopback
+from rail_corridor.view.command import run_view
 
 
 @pytest.fixture

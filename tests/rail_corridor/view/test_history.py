@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from rail_corridor.equipment.column_text import ShownValue, shown_value
 from rail_corridor.view.history import History
 from rail_corridor.view.table_reader import TableReader
-from rail_corridor.view.units import Figure, figure
 from rail_msgs_py.table import Table, TableWriter
 
 
@@ -42,25 +42,25 @@ def test_a_reader_gets_what_it_lacks_and_all_of_another_generation() -> None:
 @pytest.mark.parametrize(
     ("column", "value", "shown"),
     [
-        ("permitted_mps", 10.0, Figure("permitted", "36.0", "km/h")),
-        ("permitted_mps", math.inf, Figure("permitted", "unlimited", "")),
-        ("end_of_authority_m", math.nan, Figure("end of authority", "none", "")),
-        ("level_db", -3.04, Figure("level", "−3.0", "dB")),
-        ("heading_rad", math.pi, Figure("heading", "180.00", "°")),
-        ("variance_m2", 0.25, Figure("variance", "0.250", "m²")),
-        ("acceleration_mps2", 0.5, Figure("acceleration", "0.50", "m/s²")),
-        ("service_brake", 1.0, Figure("service brake", "yes", "")),
-        ("valid", 0.0, Figure("valid", "no", "")),
-        ("valid", math.nan, Figure("valid", "not known", "")),
-        ("beacon_snr", 100.0, Figure("beacon snr", "20.0", "dB")),
-        ("beacon_snr", 0.0, Figure("beacon snr", "none", "")),
-        ("anything", 12345678.0, Figure("anything", "1.23457e+07", "")),
+        ("permitted_mps", 10.0, ShownValue("permitted", "36.0", "km/h")),
+        ("permitted_mps", math.inf, ShownValue("permitted", "unlimited", "")),
+        ("end_of_authority_m", math.nan, ShownValue("end of authority", "none", "")),
+        ("level_db", -3.04, ShownValue("level", "−3.0", "dB")),
+        ("heading_rad", math.pi, ShownValue("heading", "180.00", "°")),
+        ("variance_m2", 0.25, ShownValue("variance", "0.250", "m²")),
+        ("acceleration_mps2", 0.5, ShownValue("acceleration", "0.50", "m/s²")),
+        ("service_brake", 1.0, ShownValue("service brake", "yes", "")),
+        ("valid", 0.0, ShownValue("valid", "no", "")),
+        ("valid", math.nan, ShownValue("valid", "not known", "")),
+        ("beacon_snr", 100.0, ShownValue("beacon snr", "20.0", "dB")),
+        ("beacon_snr", 0.0, ShownValue("beacon snr", "none", "")),
+        ("anything", 12345678.0, ShownValue("anything", "1.23457e+07", "")),
     ],
 )
 def test_the_name_of_a_column_says_how_it_is_written(
-    column: str, value: float, shown: Figure
+    column: str, value: float, shown: ShownValue
 ) -> None:
-    assert figure(column, value) == shown
+    assert shown_value(column, value) == shown
 
 
 def test_tables_are_read_whatever_their_names_become() -> None:

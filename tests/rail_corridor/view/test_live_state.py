@@ -17,7 +17,7 @@ from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.plan.announcement import announcement
 from rail_corridor.scenario.model import Scenario
 from rail_corridor.view.frame import Asked, Lists, frame
-from rail_corridor.view.live_state import STILL_S, Picture
+from rail_corridor.view.live_state import STILL_S, LiveStateStore
 from rail_corridor.view.sensors import cards
 from rail_msgs_py.failures import failure
 from rail_msgs_py.position import Position
@@ -40,11 +40,11 @@ def scenario() -> Scenario:
 
 
 class Corridor:
-    """Feeds a picture with what the corridor of a scenario would send."""
+    """Feeds a live state with what the corridor of a scenario would send."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
-        self.picture = Picture()
+        self.state = LiveStateStore()
         self.wall_s = 100.0
         self.names = tuple(train.name for train in scenario.trains)
         self.writers = 1
@@ -68,7 +68,7 @@ class Corridor:
         for name, (track, chainage_m, variance) in (said or {}).items():
             position = Position(tick * TICK_NS, name, track, chainage_m, variance, 19.0, 0.1)
             self.feed(POSITION.name(train=name), position.to_cdr())
-        self.picture.look(writers=self.writers)
+        self.state.look(writers=self.writers)
         self.wall_s += 0.25
 
     def table(self, name: str, columns: tuple[str, ...], *values: float, tick: int = 4) -> None:
@@ -77,13 +77,13 @@ class Corridor:
 
     def feed(self, name: str, message: Any) -> None:
         raw = message if isinstance(message, bytes) else serialize_message(message)
-        self.picture.feed(name, raw, self.wall_s)
+        self.state.feed(name, raw, self.wall_s)
 
     def frame(self, **asked: Any) -> dict[str, Any]:
-        return frame(self.picture, Asked(**asked), Lists(), lambda _: self.writers, self.wall_s)
+        return frame(self.state, Asked(**asked), Lists(), lambda _: self.writers, self.wall_s)
 
     def status(self) -> str:
-        return self.picture.status(self.wall_s)
+        return self.state.status(self.wall_s)
 
 
 @pytest.fixture
@@ -122,9 +122,9 @@ def test_a_corridor_is_waited_for_followed_and_seen_to_end(corridor: Corridor) -
     corridor.announce()
     assert corridor.status() == "starting"
     corridor.tick(0, PLACES)
-    assert (corridor.status(), corridor.picture.ticking) == ("running", False)
+    assert (corridor.status(), corridor.state.ticking) == ("running", False)
     corridor.tick(1, PLACES)
-    assert (corridor.status(), corridor.picture.ticking) == ("running", True)
+    assert (corridor.status(), corridor.state.ticking) == ("running", True)
     corridor.wall_s += STILL_S + 1.0
     assert corridor.status() == "still"
     corridor.tick(2, PLACES)
@@ -132,8 +132,8 @@ def test_a_corridor_is_waited_for_followed_and_seen_to_end(corridor: Corridor) -
     for key, value in to_time(2 * TICK_NS).items():
         setattr(header.stamp, key, value)
     corridor.feed(FINISHED.name(), header)
-    assert (corridor.status(), corridor.picture.ticking) == ("ended", False)
-    corridor.picture.look(writers=0)
+    assert (corridor.status(), corridor.state.ticking) == ("ended", False)
+    corridor.state.look(writers=0)
     assert corridor.status() == "ended"
 
 
@@ -145,7 +145,7 @@ def test_a_corridor_that_is_killed_is_gone_and_the_next_one_is_followed(corridor
     corridor.feed(DIAGNOSTICS.name(), array)
     before = corridor.frame()
     assert len(before["history"]["rows"]) == 5
-    corridor.picture.look(writers=0)
+    corridor.state.look(writers=0)
     assert corridor.status() == "gone"
     assert corridor.frame()["counts"]["warn"] == 1
     # What the next corridor says first begins it, and what was of the last one is forgotten.
@@ -168,8 +168,8 @@ def test_time_that_runs_back_begins_a_new_run(corridor: Corridor) -> None:
     corridor.announce()
     corridor.tick(40, PLACES)
     corridor.tick(0, PLACES)
-    assert [row[0] for row in corridor.picture.history.rows] == [0.0]
-    assert corridor.picture.line["name"] == "demo"
+    assert [row[0] for row in corridor.state.history.rows] == [0.0]
+    assert corridor.state.line["name"] == "demo"
 
 
 def test_only_what_is_new_is_sent(corridor: Corridor) -> None:
@@ -221,7 +221,7 @@ def test_a_slow_corridor_does_not_stand_still(corridor: Corridor) -> None:
     for tick in range(5):
         corridor.wall_s += 4.0
         corridor.tick(tick, PLACES)
-    assert corridor.picture.rate() == pytest.approx(0.25 / 4.25, rel=0.01)
+    assert corridor.state.rate() == pytest.approx(0.25 / 4.25, rel=0.01)
     corridor.wall_s += 8.0
     assert corridor.status() == "running"
     corridor.wall_s += 20.0
@@ -237,7 +237,7 @@ def test_cards_of_known_and_unknown_sensors(corridor: Corridor) -> None:
     zone = layout_of(corridor.scenario).zone_at("main", 1600.0)
     name = RANGE.name(site=zone.station, zone=zone.name)
     corridor.feed(name, RangeWriter(zone.name, 0.0, 400.0).write(4 * TICK_NS, 55.5, 0.01))
-    made = {card["topic"]: card for card in cards(corridor.picture, "train_a", lambda _: 1)}
+    made = {card["topic"]: card for card in cards(corridor.state, "train_a", lambda _: 1)}
     ranging = made["/wayside/zone_controller/train_a/position"]
     assert ranging["gauge"] == {"off_m": 0.3, "half_m": 0.4, "what": "2σ"}
     assert made[name]["rows"] == [["range", "55.50 ± 0.10", "m"]]
@@ -292,7 +292,7 @@ def test_failed_nodes_and_switched_off_ones_are_told_apart(corridor: Corridor) -
         status = DiagnosticStatus(level=level, name="/wayside/wrs4: equipment", message=message)
         corridor.feed(DIAGNOSTICS.name(), DiagnosticArray(status=[status]))
     lists = Lists(1, (), ("/wayside/wrs3", "/wayside/wrs4", "/wayside/wrs5"))
-    found = frame(corridor.picture, Asked(tab="health"), lists, lambda _: 1, corridor.wall_s)
+    found = frame(corridor.state, Asked(tab="health"), lists, lambda _: 1, corridor.wall_s)
     assert found["off"] == ["/wayside/wrs4"]
     assert found["failed"] == ["/wayside/wrs3"]
     assert found["health"]["failed"][0]["by"] == "/world"
@@ -319,9 +319,10 @@ def test_the_scope_says_what_it_cannot_show(corridor: Corridor) -> None:
 def test_every_scenario_announces_itself(name: str) -> None:
     corridor = Corridor(load_scenario(name))
     corridor.announce()
-    line = corridor.picture.line
+    line = corridor.state.line
     assert line["name"] == name
     assert [train["name"] for train in line["trains"]] == list(corridor.names)
     assert parse_scenario(line["scenario"]).to_json() == corridor.scenario.to_json()
+    assert all(fault["subject"] for fault in line["faults"])
     # The page needs what follows from it alone.
     assert "scenario" not in corridor.frame()["line"]

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from array import array
 from typing import Any
 
 import numpy as np
 
 from rail_corridor.equipment.registry import kind_of
-from rail_msgs_py.position import Position
-from rail_msgs_py.ranging.range_reading import RangeReading
 from rail_msgs_py.table import Table
 from rail_msgs_py.waveform import Waveform
 
@@ -26,12 +23,22 @@ def decode(topic: str, message: Any) -> str:
             view = kind.view.from_msg(message)
         except ValueError as error:
             return f"({error})\n{raw_text(message)}"
-        return str(_VIEWS[kind.view](view))
+        return _text(view)
     if hasattr(message, "status") and isinstance(message.status, list):
         return "\n".join(_status(status) for status in message.status)
     if hasattr(message, "level") and hasattr(message, "hardware_id"):
         return _status(message)
     return raw_text(message)
+
+
+def _text(view: Any) -> str:
+    """A view in words: its own where it has some."""
+    if isinstance(view, Waveform):
+        return _waveform(view)
+    if isinstance(view, Table):
+        return _table(view)
+    words = view.describe() if hasattr(view, "describe") else repr(view)
+    return f"{_time(view.stamp_ns)}  {words}"
 
 
 def _time(stamp_ns: int) -> str:
@@ -51,23 +58,6 @@ def _waveform(block: Waveform) -> str:
     )
 
 
-def _range(reading: RangeReading) -> str:
-    line = f"{_time(reading.stamp_ns)}  {reading.zone}: "
-    if reading.usable:
-        return f"{line}{reading.range_m:.3f} m ± {math.sqrt(reading.variance_m2):.3f} m"
-    return line + ("disturbed" if reading.disturbed else "nothing heard")
-
-
-def _position(position: Position) -> str:
-    line = f"{_time(position.stamp_ns)}  {position.train} on {position.track}: "
-    if not position.known:
-        return f"{line}not known (last {position.chainage_m:.1f} m)"
-    return (
-        f"{line}{position.chainage_m:.3f} m ± {math.sqrt(position.variance_m2):.3f} m, "
-        f"{position.speed_mps * 3.6:.1f} km/h"
-    )
-
-
 def _table(table: Table) -> str:
     lines = []
     for name, values in zip(table.rows, table.values, strict=True):
@@ -75,14 +65,6 @@ def _table(table: Table) -> str:
         figures = "  ".join(f"{column} {value:.6g}" for column, value in pairs)
         lines.append(f"{_time(table.stamp_ns)}  {name}: {figures}")
     return "\n".join(lines)
-
-
-_VIEWS: dict[Any, Any] = {
-    Waveform: _waveform,
-    RangeReading: _range,
-    Position: _position,
-    Table: _table,
-}
 
 
 def _status(status: Any) -> str:

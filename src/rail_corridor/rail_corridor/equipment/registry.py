@@ -21,6 +21,7 @@ from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import tick, world
 from rail_msgs_py.topics.topic import Topic
 
+from .live import LiveView
 from .node_spec import NodeKind
 from .subsystem import Subsystem, Supervision
 
@@ -70,6 +71,12 @@ def node_kinds() -> dict[str, NodeKind]:
     """Every kind of node by its name."""
     kinds = [WORLD, *(kind for subsystem in subsystems() for kind in subsystem.nodes)]
     return {kind.name: kind for kind in kinds}
+
+
+@lru_cache(maxsize=1)
+def live_views() -> tuple[LiveView, ...]:
+    """What every subsystem shows on the live page."""
+    return tuple(subsystem.live() for subsystem in subsystems())
 
 
 @lru_cache(maxsize=1)

@@ -15,7 +15,10 @@ from rail_msgs_py.topics.topic import Topic
 from rail_world.line.description_base import Description
 from rail_world.line.drawing import Drawing
 
+from .live import LiveView
+from .map_scene import MapMarkers, MapScene
 from .node_spec import NodeKind, NodeSpec
+from .run_figures import RunFigures
 
 
 @dataclass(frozen=True)
@@ -167,3 +170,15 @@ class Subsystem:
     def tables(self, report: Mapping[str, Any]) -> Iterable[RenderableType]:
         """What the report shows of it on the screen."""
         return ()
+
+    def live(self) -> LiveView:
+        """What it shows on the live page; made once, and only by those who draw it."""
+        return LiveView()
+
+    def map_markers(self, scene: MapScene) -> MapMarkers:
+        """What it adds to the trains in RViz and Foxglove."""
+        return MapMarkers()
+
+    def run_figures(self) -> RunFigures:
+        """What it adds to the figures of a run; made only by those who draw them."""
+        return RunFigures()

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rail_corridor.equipment.ranging.layout import Zone, layout_of
+from rail_corridor.equipment.ranging.run_figures import pair_colour
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plotting import COLOURS, Picture
 from rail_corridor.scenario.model import Scenario
@@ -33,8 +34,6 @@ _RATE_HZ: Final = 75e6  # 200 samples in a period
 _DELAY_S: Final = 1e-6  # of the transponder: 135 degrees, 150 m
 _DISTANCE_M: Final = 123.0
 _SEED: Final = 41
-#: Colours of the channel pairs 1/2, 3/4, 5/6 and 7/8.
-_PAIR_COLOURS: Final = (COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3])
 
 
 def tones(lag_deg: float, periods: int = 2) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -167,11 +166,6 @@ def _comparators(figure: Figure) -> None:
         ylim=(0.0, 480.0),
     )
     axes.legend(loc="upper left")
-
-
-def pair_colour(zone: Zone) -> str:
-    """Colour of the channel pair of a zone."""
-    return _PAIR_COLOURS[(zone.downlink_channel - 1) // 2 % len(_PAIR_COLOURS)]
 
 
 def _pair(zone: Zone) -> str:

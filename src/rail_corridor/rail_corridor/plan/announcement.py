@@ -48,5 +48,7 @@ def _line(scenario: Scenario) -> dict[str, Any]:
             }
             for train in scenario.trains
         ],
-        "faults": [fault.model_dump(mode="json") for fault in scenario.faults],
+        "faults": [
+            fault.model_dump(mode="json") | {"subject": fault.subject} for fault in scenario.faults
+        ],
     }

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from std_msgs.msg import Header
 
+from rail_corridor.equipment.map_scene import MapScene
 from rail_corridor.plan.plan import REPORT, Plan
 from rail_corridor.run_data import RunData
 from rail_msgs_py.failures import failure
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.stamps import NANOSECONDS
-from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
-from rail_msgs_py.topics.ranging import POSITION
 from rail_msgs_py.topics.tick import FAILED, OBSERVED
 from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.world import STATE, TRAIN_MARKERS
@@ -128,16 +127,12 @@ class Observer(CorridorNode):
             return
         recording = self.intake.recording
 
-        def rows(topic: Topic) -> FloatArray:
+        def table(topic: Topic) -> FloatArray | None:
+            if topic not in recording:
+                return None
             return np.asarray(recording[topic].upto(tick + 1)[tick])
 
-        markers = train_markers(
-            tick * self._tick_ns,
-            recording.trains,
-            self._network,
-            rows(STATE),
-            rows(POSITION),
-            rows(LOCALIZER_STATE) if LOCALIZER_STATE in recording else None,
-            first_tracks=self._first_tracks,
+        scene = MapScene(
+            tick * self._tick_ns, recording.trains, self._network, self._first_tracks, table
         )
-        self._markers.publish(markers)
+        self._markers.publish(train_markers(scene))

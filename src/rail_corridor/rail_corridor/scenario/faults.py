@@ -16,6 +16,12 @@ class Fault(Description):
 
     kind: str
 
+    @property
+    def subject(self) -> str:
+        """What it befalls, for those who list faults: the first name in it."""
+        fields = (name for name in type(self).model_fields if name != "kind")
+        return next((v for name in fields if isinstance(v := getattr(self, name), str)), "")
+
 
 class TimedFault(Fault):
     """A fault that lasts from one time to another."""

@@ -15,9 +15,11 @@ import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from rail_corridor.equipment.registry import live_views
+
 from .frame import Asked, Lists, frame
-from .live_state import Picture
-from .sensors import zone_topics
+from .layout import panel_of
+from .live_state import LiveStateStore
 from .switches import Switches, equipment_of, natural
 from .taps import Taps
 from .wanted import Wish, is_waveform, wanted
@@ -52,7 +54,7 @@ class Bridge:
         )
         self._switches = Switches(self._context, f"{name}_switches")
         self._taps = Taps(self._node)
-        self.picture = Picture()
+        self.state = LiveStateStore()
         self.lists = Lists()
         self._names: Mapping[str, Any] = {}
         self._wishes: dict[str, tuple[float, Wish]] = {}
@@ -66,15 +68,16 @@ class Bridge:
             self._discover(services=now_s >= self._services_s)
         self._hold(now_s)
         for name, raw in self._taps.take():
-            self.picture.feed(name, raw, now_s)
-        self.picture.look(writers=self._taps.writers("/world/state"))
+            self.state.feed(name, raw, now_s)
+        self.state.look(writers=self._taps.writers("/world/state"))
 
     def frame(self, browser: str, asked: Asked) -> dict[str, Any]:
         """Message for one browser, which is remembered for what it looks at."""
         now_s = time.monotonic()
+        panel = panel_of(asked.tab)
         wish = Wish(
             train=asked.train,
-            telegrams=asked.tab == "telegrams",
+            telegrams=panel is not None and panel.log,
             scope=asked.scope if asked.tab == "scope" else "",
         )
         new = browser not in self._wishes or self._wishes[browser][1] != wish
@@ -83,7 +86,7 @@ class Bridge:
             while len(self._wishes) > _MOST_BROWSERS:
                 self._wishes.pop(min(self._wishes, key=lambda b: self._wishes[b][0]))
             self._hold(now_s)
-        return frame(self.picture, asked, self.lists, self._taps.writers, now_s)
+        return frame(self.state, asked, self.lists, self._taps.writers, now_s)
 
     def switch(self, equipment: str, *, on: bool) -> str:
         """Switch equipment; returns why it did not work. For a thread of its own: it waits."""
@@ -120,6 +123,10 @@ class Bridge:
             if now_s - seen_s < WISH_S
         }
         wishes = {wish for _, wish in self._wishes.values()}
-        picture = self.picture
-        zones = {wish.train: zone_topics(picture, wish.train) for wish in wishes if wish.train}
-        self._taps.hold(wanted(self._names, wishes, zones, ticking=picture.ticking))
+        state = self.state
+        details = {
+            wish.train: [name for view in live_views() for name in view.details(state, wish.train)]
+            for wish in wishes
+            if wish.train
+        }
+        self._taps.hold(wanted(self._names, wishes, details, ticking=state.ticking))

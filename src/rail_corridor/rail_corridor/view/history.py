@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from .located import off_the_truth
-
-if TYPE_CHECKING:
-    from .live_state import Picture
+from rail_corridor.equipment.live import LiveView
+from rail_corridor.equipment.live_state import LiveState
+from rail_corridor.equipment.registry import live_views
 
 MOST_ROWS = 1500
 LEAST_STEP_S = 0.5
@@ -53,28 +52,37 @@ class History:
         return count, self.rows[count:]
 
 
-def history_row(picture: Picture, train: str) -> list[Any] | None:
-    """Where a train is: track, position by phase ranging and its sigma, truth.
+def traced() -> tuple[LiveView, ...]:
+    """Whose errors the page can draw, in the order of a row."""
+    return tuple(view for view in live_views() if view.error_trace is not None)
 
-    Behind that what a localizer says, less the truth of its own tick: position, low and high end.
-    None if the train is not on the line.
+
+def history_row(state: LiveState, train: str) -> list[Any] | None:
+    """Where a train is: track, measured position and its sigma, truth.
+
+    Behind that for each of `traced` its estimate, low and high end less the truth of its own tick;
+    three times None where it has none, unless nothing follows. None if the train is not on the
+    line.
     """
-    said = picture.positions.get(train)
-    true = picture.true_place(train, said[0]) if said is not None else None
+    measured = state.position(train)
+    true = state.true_place(train, measured.stamp_ns) if measured is not None else None
     if true is None:
-        said, true = None, picture.true_place(train, picture.now_ns)
+        measured, true = None, state.true_place(train, state.now_ns)
     if true is None:
         return None
-    known = said is not None and math.isfinite(said[2][1])
-    if not known or said is None:
+    if measured is None or not measured.known:
         row: list[Any] = [true[0], None, None, round(true[1], 2)]
     else:
-        chainage_m, variance_m2 = said[2][:2]
         row = [
-            said[1],
-            round(chainage_m, 2),
-            round(math.sqrt(variance_m2), 3),
-            round(true[1], 2) if true[0] in ("", said[1]) else None,
+            measured.track,
+            round(measured.chainage_m, 2),
+            round(math.sqrt(measured.variance_m2), 3),
+            round(true[1], 2) if true[0] in ("", measured.track) else None,
         ]
-    off = off_the_truth(picture, train)
-    return row if off is None else [*row, *(round(value, 2) for value in off)]
+    errors: list[Any] = []
+    for view in traced():
+        error = view.error(state, train)
+        errors += [None] * 3 if error is None else [round(value, 2) for value in error]
+    while errors and errors[-1] is None:
+        errors.pop()
+    return [*row, *errors]

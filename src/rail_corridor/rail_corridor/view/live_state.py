@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections import OrderedDict, deque
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -13,23 +13,22 @@ from nav_msgs.msg import Path
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
-from rail_msgs_py.position import figures_from_cdr as position_from_cdr
-from rail_msgs_py.ranging.range_reading import RangeReading
+from rail_corridor.equipment.live import SymbolReader
+from rail_corridor.equipment.live_state import LiveState, View
+from rail_corridor.equipment.registry import live_views
+from rail_msgs_py.position import Position
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.table import Table
-from rail_msgs_py.topics.ranging import POSITION, RANGE
 from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, FINISHED
 from rail_msgs_py.topics.world import CORRIDOR_PATH, SCENARIO, STATE
 from rail_msgs_py.waveform import Waveform
 
 from .health import Health
 from .history import History, history_row
+from .layout import layout
+from .message_log import MessageLog
 from .table_reader import TableReader
-from .telegram_log import TelegramLog
-from .wanted import STATE_DEPTH, TELEGRAMS, kind_of
-
-if TYPE_CHECKING:
-    from .symbols import BurstReader
+from .wanted import STATE_DEPTH, events, kind_of
 
 #: Without a tick for so long [s of wall time], and for so many ticks, a run stands still.
 STILL_S = 3.0
@@ -41,18 +40,19 @@ _SETTLED_S = 2.0
 _MOST_POINTS = 600
 
 
-class Picture:
+class LiveStateStore(LiveState):
     """The state of one corridor, fed with serialised messages as they are taken."""
 
     def __init__(self) -> None:
-        self.line: dict[str, Any] = {}
+        self._line: dict[str, Any] = {}
+        self._layout = layout({})
         #: Grows when the line, or the run on it, is another one.
         self.run = 0
         self.paths: dict[str, list[list[float]]] = {}
         self.health = Health()
         self.history = History()
-        self.bursts: BurstReader | None = None
-        self.telegrams = TelegramLog()
+        self.symbol_readers: tuple[SymbolReader, ...] = ()
+        self._logs: dict[str, MessageLog] = {}
         self.blocks: dict[str, bytes] = {}
         self.not_tables: set[str] = set()
         self._over = False
@@ -62,10 +62,9 @@ class Picture:
     def _forget(self) -> None:
         self.trains: tuple[str, ...] = ()
         self.truth: OrderedDict[int, Any] = OrderedDict()
-        self.positions: dict[str, tuple[int, str, tuple[float, float, float, float]]] = {}
-        self.tables: dict[str, Table] = {}
-        self.ranges: dict[str, RangeReading] = {}
-        self.now_ns = -1
+        self._tables: dict[str, Table] = {}
+        self._readings: dict[str, Any] = {}
+        self._now_ns = -1
         self.finished = False
         self.gone = False
         self._first_tick_s = self._last_tick_s = math.nan
@@ -80,13 +79,8 @@ class Picture:
         kind = kind_of(name)
         if kind is STATE:
             self._on_state(raw, wall_s)
-        elif kind is POSITION:
-            stamp_ns, track, figures = position_from_cdr(raw)
-            self.positions[name.split("/")[3]] = (stamp_ns, track, figures)
-        elif kind is RANGE:
-            self.ranges[name] = RangeReading.from_cdr(raw)
-        elif kind in TELEGRAMS:
-            self.telegrams.put(name, raw)
+        elif kind in events():
+            self._on_event(name, raw)
         elif kind is SCENARIO:
             self._on_scenario(deserialize_message(raw, String).data)
         elif kind is CORRIDOR_PATH:
@@ -99,6 +93,8 @@ class Picture:
             self.health.on_failed(deserialize_message(raw, DiagnosticStatus), self._heard_s(wall_s))
         elif kind is FINISHED:
             self.finished = clock_from_cdr(raw) >= self.now_ns
+        elif kind is not None and kind.view not in (None, Table, Waveform):
+            self._readings[name] = kind.view.from_cdr(raw)
         else:
             self._on_array(name, raw)
 
@@ -112,6 +108,43 @@ class Picture:
         if self.now_ns >= 0 and not self.gone:
             self.history.put(self.now_s, [history_row(self, name) for name in self.trains])
 
+    # Asked by equipment ------------------------------------------------------------------
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """See `LiveState.line`."""
+        return self._line
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        """See `LiveState.tables`."""
+        return self._tables
+
+    @property
+    def tracks(self) -> list[str]:
+        """See `LiveState.tracks`."""
+        return [track["name"] for track in self.line.get("tracks", ())]
+
+    @property
+    def now_ns(self) -> int:
+        """See `LiveState.now_ns`; below 0 before the first tick."""
+        return self._now_ns
+
+    def row(self, name: str) -> dict[str, float]:
+        """See `LiveState.row`."""
+        table = self.tables.get(name)
+        return table.row(table.rows[0]) if table is not None and table.rows else {}
+
+    def reading(self, name: str, view: type[View]) -> View | None:
+        """See `LiveState.reading`."""
+        found = self._readings.get(name)
+        return found if isinstance(found, view) else None
+
+    def position(self, train: str) -> Position | None:
+        """See `LiveState.position`."""
+        found = (self.reading(name, Position) for name in position_topics(train))
+        return next((position for position in found if position is not None), None)
+
     # Asked by the page -------------------------------------------------------------------
 
     @property
@@ -124,20 +157,15 @@ class Picture:
         """Whether ticks run: from the second one on, and as long as the world is there."""
         return self.now_ns > 0 and not (self.gone or self.finished)
 
-    @property
-    def tracks(self) -> list[str]:
-        """Names of the tracks, in the order that counts them."""
-        return [track["name"] for track in self.line.get("tracks", ())]
-
     def drawn(self) -> dict[str, Any]:
-        """What the page draws the line from; without an announcement the paths of its tracks."""
+        """What the page draws; without an announcement the line has the paths of its tracks."""
         line = {key: value for key, value in self.line.items() if key != "scenario"}
         if "tracks" not in line:
             line["tracks"] = [
                 {"name": name, "length_m": _length_m(points), "from": None, "from_m": 0.0}
                 for name, points in self.paths.items()
             ]
-        return line | {"paths": self.paths}
+        return line | self._layout | {"paths": self.paths}
 
     def status(self, wall_s: float) -> str:
         """One of waiting, starting, running, still, ended, gone."""
@@ -162,8 +190,12 @@ class Picture:
         first, last = self._ticks[0], self._ticks[-1]
         return (last[1] - first[1]) / (last[0] - first[0])
 
+    def log(self, panel: str) -> MessageLog:
+        """Log of a panel, by its name."""
+        return self._logs.setdefault(panel, MessageLog())
+
     def true_row(self, train: str, stamp_ns: int | None = None) -> dict[str, float] | None:
-        """Truth about a train at a tick, the newest if none is said; None if it is not known."""
+        """See `LiveState.true_row`."""
         if train not in self.trains or not self.truth:
             return None
         if stamp_ns is None:
@@ -175,7 +207,7 @@ class Picture:
         return dict(zip(STATE.columns, row, strict=True))
 
     def true_place(self, train: str, stamp_ns: int) -> tuple[str, float] | None:
-        """Track and chainage of a train at a tick; None if that is not known or not on the line."""
+        """See `LiveState.true_place`."""
         row = self.true_row(train, stamp_ns)
         if row is None or row["on_line"] <= 0.0:
             return None
@@ -184,12 +216,12 @@ class Picture:
         return (tracks[index] if index < len(tracks) else "", row["chainage_m"])
 
     def first_track(self, train: str) -> str:
-        """Track that a train's route begins on; empty if it has not been told."""
+        """See `LiveState.first_track`."""
         routes = {t["name"]: t.get("route") or ("",) for t in self.line.get("trains", ())}
         return str(routes.get(train, ("",))[0])
 
     def error_m(self, train: str, track: str, chainage_m: float, stamp_ns: int) -> float | None:
-        """How far an estimate is ahead of the truth of its own tick, on the same track."""
+        """See `LiveState.error_m`."""
         place = self.true_place(train, stamp_ns)
         if place is None or (place[0] and track and place[0] != track):
             return None
@@ -207,7 +239,7 @@ class Picture:
             self._begin_run()
         if self.now_ns < 0:
             self._first_tick_s = wall_s
-        self.trains, self.now_ns, self._last_tick_s = table.rows, table.stamp_ns, wall_s
+        self.trains, self._now_ns, self._last_tick_s = table.rows, table.stamp_ns, wall_s
         self.truth[table.stamp_ns] = np.array(table.values)
         while len(self.truth) > STATE_DEPTH:
             self.truth.popitem(last=False)
@@ -218,13 +250,14 @@ class Picture:
     def _on_scenario(self, text: str) -> None:
         try:
             line = json.loads(text or "{}")
-            bursts = _reader_of(line["bursts"]) if line.get("bursts") else None
+            readers = [view.symbol_reader(line) for view in live_views()]
+            found = layout(line)
         except (ValueError, KeyError, TypeError):
             return  # of another version: drawn from what the other topics say
-        self.line, self.bursts = line, bursts
+        self._line, self._layout = line, found
+        self.symbol_readers = tuple(reader for reader in readers if reader is not None)
         self.run += 1
-        trains = [train["name"] for train in line.get("trains", ())]
-        self.telegrams = TelegramLog(trains, self.tracks)
+        self._logs = {}
 
     def _on_path(self, name: str, path: Any) -> None:
         """Centre line as rows of share of the length, x and y; its poses are evenly spaced."""
@@ -237,6 +270,12 @@ class Picture:
             points.append([round(share, 6), round(place.x, 1), round(place.y, 1)])
         self.paths[name.split("/")[2]] = points
         self.run += 1
+
+    def _on_event(self, name: str, raw: bytes) -> None:
+        kind = kind_of(name)
+        for view in live_views():
+            if view.panel is not None and kind in view.events:
+                self.log(view.panel.name).put(view.log_entries(self.line, name, raw))
 
     def _on_array(self, name: str, raw: bytes) -> None:
         """A table, or the block of a scope; of what kind a stranger is, its layout tells."""
@@ -259,18 +298,17 @@ class Picture:
         self.health.clear()
         self.history.clear()
         self.blocks.clear()
-        self.telegrams = TelegramLog([t["name"] for t in self.line.get("trains", ())], self.tracks)
+        self._logs = {}
         self.run += 1
+
+
+def position_topics(train: str) -> list[str]:
+    """Topics that carry the measured position of a train."""
+    topics = [view.position_topic for view in live_views() if view.position_topic is not None]
+    return [topic.name(train=train) for topic in topics]
 
 
 def _length_m(points: list[list[float]]) -> float:
     """Length of a path of share, x and y, along its chords."""
     steps = np.diff(np.array(points)[:, 1:], axis=0)
     return float(np.hypot(*steps.T).sum())
-
-
-def _reader_of(described: dict[str, Any]) -> BurstReader:
-    """Reader of the bursts of a train radio; it brings much of SciPy, which takes time to load."""
-    from .symbols import BurstReader
-
-    return BurstReader(described)

@@ -6,15 +6,14 @@ Pure: arrays in, lists of rounded numbers out, few enough to be sent several tim
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rail_corridor.equipment.live import SymbolReader
 from rail_msgs_py.waveform import Waveform
-
-if TYPE_CHECKING:
-    from .symbols import BurstReader
 
 POINTS = 480
 BINS = 400
@@ -24,7 +23,7 @@ _FLOOR_DB = -220.0
 
 
 def scope(
-    block: Waveform, antenna: int = 0, zoom: int = 1, bursts: BurstReader | None = None
+    block: Waveform, antenna: int = 0, zoom: int = 1, readers: Iterable[SymbolReader] = ()
 ) -> dict[str, Any]:
     """What the scope draws of one block.
 
@@ -35,8 +34,8 @@ def scope(
         Counted from 0; taken as the last one there is where it is more.
     zoom : int
         Which part of the block is drawn over time: 1 of so many, from where the signal begins.
-    bursts : BurstReader, optional
-        Reads the symbols of train radio bursts, where the block holds any.
+    readers : iterable of SymbolReader
+        Asked in turn for the symbols of bursts, where the block holds any.
     """
     antennas, count = block.samples.shape
     antenna = min(max(antenna, 0), antennas - 1)
@@ -59,8 +58,9 @@ def scope(
     shown["real"] = bool(real)
     shown["time"] = over_time(samples, block.sample_rate_hz, zoom, real=real)
     shown["spectrum"] = spectrum(samples, block.sample_rate_hz, real=real)
-    found = bursts.symbols(block, antenna) if bursts is not None else None
-    shown["plane"] = found if found is not None else plane(samples)
+    found = (reader.symbols(block, antenna) for reader in readers)
+    symbols = next((each for each in found if each is not None), None)
+    shown["plane"] = plane(samples) if symbols is None else symbols
     return shown
 
 

@@ -10,23 +10,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
-from rail_corridor.equipment.registry import kind_of
+from rail_corridor.equipment.registry import kind_of as find_kind
+from rail_corridor.equipment.registry import live_views
 from rail_msgs_py.table import Table
-from rail_msgs_py.topics.doppler import DOPPLER_FIX
-from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.qos import LATCHED, STREAM
-from rail_msgs_py.topics.ranging import POSITION, RANGE, VRS_CHANNEL
 from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, FINISHED
 from rail_msgs_py.topics.topic import Topic
-from rail_msgs_py.topics.track_code import CODE_SENT, OCCUPANCY
-from rail_msgs_py.topics.train_radio import (
-    ATP_STATE,
-    AUTHORITY,
-    DOWN_TELEGRAMS,
-    RADIO_TELEGRAMS,
-    TRAIN_TELEGRAMS,
-    UP_TELEGRAMS,
-)
 from rail_msgs_py.topics.world import COMMAND, CORRIDOR_PATH, SCENARIO, STATE
 from rail_msgs_py.waveform import Waveform
 
@@ -34,23 +23,27 @@ ARRAY: Final = "std_msgs/msg/Float64MultiArray"
 #: Ticks of truth that are kept, so that an estimate is held against the truth of its own tick.
 STATE_DEPTH: Final = 64
 #: Telegrams of a few ticks: none should be missed between two looks.
-TELEGRAM_DEPTH: Final = 8
-
-#: Read for every train and circuit.
-OVERVIEW: Final = (
-    *(POSITION, VRS_CHANNEL, COMMAND, ATP_STATE, AUTHORITY),
-    *(OCCUPANCY, CODE_SENT, LOCALIZER_STATE),
-)
+EVENT_DEPTH: Final = 8
 #: Read always, also before there is a corridor.
-STANDING: Final = (*(STATE, SCENARIO, FINISHED, FAILED, DIAGNOSTICS),)
-#: Estimates that are kept for the report, and waited for on board as well.
-AWAITED_ESTIMATES: Final = (COMMAND, DOPPLER_FIX, LOCALIZER_STATE)
-TELEGRAMS: Final = (
-    *(TRAIN_TELEGRAMS, RADIO_TELEGRAMS),
-    *(DOWN_TELEGRAMS, UP_TELEGRAMS),
-)
+STANDING: Final = (STATE, SCENARIO, FINISHED, FAILED, DIAGNOSTICS)
 
-kind_of = lru_cache(maxsize=20_000)(kind_of)
+
+@lru_cache(maxsize=1)
+def overview() -> tuple[Topic, ...]:
+    """Read for every train and place."""
+    return (COMMAND, *(topic for view in live_views() for topic in view.overview))
+
+
+@lru_cache(maxsize=1)
+def events() -> tuple[Topic, ...]:
+    """Topics of which every message counts."""
+    return tuple(topic for view in live_views() for topic in view.events)
+
+
+@lru_cache(maxsize=20_000)
+def kind_of(name: str) -> Topic | None:
+    """See `rail_corridor.equipment.registry.kind_of`."""
+    return find_kind(name)
 
 
 @dataclass(frozen=True)
@@ -64,7 +57,7 @@ class Tap:
 
 @dataclass(frozen=True)
 class Wish:
-    """What one browser looks at, beside the overview."""
+    """What one browser looks at beside the overview: a train, a log of telegrams, a waveform."""
 
     train: str = ""
     telegrams: bool = False
@@ -74,7 +67,7 @@ class Wish:
 def wanted(
     names: Mapping[str, Collection[str]],
     wishes: Collection[Wish],
-    zones: Mapping[str, Collection[str]],
+    details: Mapping[str, Collection[str]],
     *,
     ticking: bool,
 ) -> dict[str, Tap]:
@@ -85,8 +78,8 @@ def wanted(
     names : mapping
         Topics that are there, and their types.
     wishes : collection of Wish
-    zones : mapping
-        Train to topics of the ranges measured to it.
+    details : mapping
+        Train to the topics beyond its namespace that are read while it is looked at.
     ticking : bool
         Whether ticks run. Before the first one a stream must not be read by strangers: nodes take
         any reader of what they send for the one that they wait for.
@@ -100,22 +93,22 @@ def wanted(
         for topic in STANDING
     }
     trains = {wish.train for wish in wishes if wish.train}
+    named = {name for train in trains for name in details.get(train, ())}
     telegrams = any(wish.telegrams for wish in wishes)
     for name, types in names.items():
         kind = kind_of(name)
         if kind is CORRIDOR_PATH:
             taps[name] = Tap(kind.type, latched=True)
-        elif kind in OVERVIEW:
-            if ticking or not awaited(kind):
-                taps[name] = Tap(kind.type)
-        elif kind in TELEGRAMS:
+        elif kind in events():
             if telegrams and ticking:
-                taps[name] = Tap(kind.type, TELEGRAM_DEPTH)
-        elif of_train(name) in trains and is_table(kind, types) and (ticking or not awaited(kind)):
+                taps[name] = Tap(kind.type, EVENT_DEPTH)
+        elif awaited(kind) and not ticking:
+            continue
+        elif kind is not None and (kind in overview() or name in named):
+            taps[name] = Tap(kind.type)
+        elif of_train(name) in trains and is_table(kind, types):
             taps[name] = Tap(STATE.type)
     if ticking:
-        for train in trains:
-            taps.update((n, Tap(RANGE.type)) for n in zones.get(train, ()) if n in names)
         for wish in wishes:
             if ARRAY in names.get(wish.scope, ()):
                 taps[wish.scope] = Tap(STATE.type)
@@ -124,7 +117,7 @@ def wanted(
 
 def awaited(kind: Topic | None) -> bool:
     """Whether a node waits for its reader on a topic before the first tick, as far as is known."""
-    return kind is None or kind.qos is STREAM or kind in AWAITED_ESTIMATES
+    return kind is None or kind.qos is STREAM or kind.awaited
 
 
 def is_table(kind: Topic | None, types: Collection[str]) -> bool:
@@ -140,12 +133,11 @@ def is_waveform(name: str, types: Collection[str]) -> bool:
 
 @lru_cache(maxsize=20_000)
 def of_train(name: str) -> str:
-    """Train that a topic may be about, by its name: its namespace, or its part below the wayside.
+    """Train that a topic may be about, by its kind; its namespace if it is of no known kind.
 
-    >>> of_train("/train_a/vrs/channel"), of_train("/wayside/zone_controller/train_a/authority")
+    >>> of_train("/train_a/radar/fix"), of_train("/wayside/zone_controller/train_a/authority")
     ('train_a', 'train_a')
     """
-    parts = name.split("/")
-    if name.startswith("/wayside/zone_controller/") and len(parts) == 5:
-        return parts[3]
-    return parts[1]
+    kind = kind_of(name)
+    parts = {} if kind is None else kind.parts(name)
+    return parts.get("train", name.split("/")[1])

@@ -17,8 +17,8 @@ from fastapi.middleware.trustedhost import TrustedHostMiddleware
 from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
+from .address import is_loopback
 from .bridge import Bridge
-from .command import is_loopback
 from .frame import Asked
 
 STATIC = Path(__file__).parent / "static"

@@ -87,6 +87,12 @@ class RangeReading:
         _, low_m, high_m, range_m, variance_m2 = _TAIL.unpack_from(raw, len(raw) - _TAIL.size)
         return cls(clock_from_cdr(raw), zone, range_m, variance_m2, low_m, high_m)
 
+    def describe(self) -> str:
+        """In words, without the time."""
+        if self.usable:
+            return f"{self.zone}: {self.range_m:.3f} m ± {math.sqrt(self.variance_m2):.3f} m"
+        return f"{self.zone}: {'disturbed' if self.disturbed else 'nothing heard'}"
+
 
 def range_from_cdr(raw: bytes) -> tuple[int, float, float]:
     """Stamp [ns], range [m] and variance [m^2] of a serialised reading, and no more."""

@@ -45,6 +45,7 @@ DOPPLER_FIX: Final = Topic(
         *("reason", "chainage_m", "speed_mps"),
         *("chainage_m2", "chainage_speed_m2ps", "speed_m2ps2", "tones", "offset_hz"),
     ),
+    awaited=True,
 )
 DOPPLER_POSITION: Final = Topic(
     "/{train}/doppler/position",

@@ -44,6 +44,7 @@ LOCALIZER_STATE: Final = Topic(
         *("status", "reason", "found", "excluded"),
         *("front_m", "low_m", "high_m", "speed_mps", "speed_low_mps", "speed_high_mps", "sigma_m"),
     ),
+    awaited=True,
 )
 
 #: In the order of the documentation.

@@ -28,6 +28,9 @@ class Topic:
         Of a table: names of its columns, each ending in its unit.
     below_owner : int
         Levels of its name below that of the node that sends it.
+    awaited : bool
+        Whether a node may wait for its reader before the first tick although it is not a stream: an
+        estimate that other equipment acts on.
     """
 
     pattern: str
@@ -39,6 +42,7 @@ class Topic:
     text: str
     columns: tuple[str, ...] = ()
     below_owner: int = 1
+    awaited: bool = False
 
     @cached_property
     def index(self) -> dict[str, int]:
@@ -68,7 +72,21 @@ class Topic:
         """
         return self.name(**parts).rsplit("/", self.below_owner)[0]
 
+    @cached_property
+    def _expression(self) -> re.Pattern[str]:
+        groups = re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>[^/]+)", re.escape(self.pattern))
+        return re.compile(groups)
+
     def matches(self, name: str) -> bool:
         """Whether ``name`` is of this kind."""
-        expression = re.sub(r"\\\{\w+\\\}", r"[^/]+", re.escape(self.pattern))
-        return re.fullmatch(expression, name) is not None
+        return self._expression.fullmatch(name) is not None
+
+    def parts(self, name: str) -> dict[str, str]:
+        """What stands in a name for each placeholder; empty if it is not of this kind.
+
+        >>> from rail_msgs_py.topics.ranging import RANGE
+        >>> RANGE.parts("/wayside/wrs1/zone1/range")
+        {'site': 'wrs1', 'zone': 'zone1'}
+        """
+        found = self._expression.fullmatch(name)
+        return {} if found is None else found.groupdict()

@@ -95,6 +95,7 @@ COMMAND: Final = Topic(
     "world, people, the report",
     "What supervision on board permits and demands; it moves the train in the next tick.",
     columns=("permitted_mps", "warning", "service_brake", "emergency_brake"),
+    awaited=True,
 )
 
 #: In the order of the documentation.

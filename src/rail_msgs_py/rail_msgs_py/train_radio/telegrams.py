@@ -93,6 +93,11 @@ class Telegrams:
         """View of a serialised message; raises as `from_msg`."""
         return cls.from_msg(deserialize_message(raw, UInt8MultiArray))
 
+    def describe(self) -> str:
+        """In words, without the time."""
+        slots = ", ".join(f"slot {slot}: {frame.hex()}" for slot, frame in self.frames)
+        return slots or "no telegram"
+
     def in_slot(self, slot: int) -> list[bytes]:
         """Frames of one slot."""
         return [frame for each, frame in self.frames if each == slot]

@@ -7,8 +7,10 @@ from typing import Any, Final
 
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.position_errors import position_table
+from rail_corridor.equipment.run_figures import RunFigures
 from rail_corridor.equipment.subsystem import PlanContext, SectionOption, Subsystem
 from rail_corridor.run_data import RecordSpec, RunData, per_train
 from rail_corridor.scenario.model import Scenario
@@ -102,6 +104,18 @@ class Doppler(Subsystem):
         table = position_table("positions on board by Doppler shifts", report["trains"], "doppler")
         if table is not None:
             yield table
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import DopplerView  # wanted by the live page only
+
+        return DopplerView()
+
+    def run_figures(self) -> RunFigures:
+        """See `Subsystem.run_figures`."""
+        from .run_figures import DopplerFigures  # wanted by the figures only
+
+        return DopplerFigures()
 
 
 DOPPLER: Final = Doppler()

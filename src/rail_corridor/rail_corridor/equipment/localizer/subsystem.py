@@ -7,9 +7,12 @@ from typing import Any, Final
 
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
+from rail_corridor.equipment.map_scene import MapMarkers, MapScene
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.one_way import check_one_way
 from rail_corridor.equipment.position_errors import position_table
+from rail_corridor.equipment.run_figures import RunFigures
 from rail_corridor.equipment.subsystem import PlanContext, Subsystem
 from rail_corridor.run_data import RecordSpec, RunData, per_train
 from rail_corridor.scenario.model import Scenario
@@ -69,6 +72,24 @@ class Localizer(Subsystem):
         table = position_table(title, report["trains"], "localizer", *more)
         if table is not None:
             yield table
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import LocalizerView  # wanted by the live page only
+
+        return LocalizerView()
+
+    def run_figures(self) -> RunFigures:
+        """See `Subsystem.run_figures`."""
+        from .run_figures import LocalizerFigures  # wanted by the figures only
+
+        return LocalizerFigures()
+
+    def map_markers(self, scene: MapScene) -> MapMarkers:
+        """See `Subsystem.map_markers`."""
+        from .map_markers import interval_markers  # wanted by the report only
+
+        return interval_markers(scene)
 
 
 LOCALIZER: Final = Localizer()

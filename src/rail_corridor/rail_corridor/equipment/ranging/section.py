@@ -248,6 +248,11 @@ class Jam(TimedFault):
     track: Name = Field(description="track it stands at")
     at_m: Chainage = Field(description="chainage it stands at [m]")
 
+    @property
+    def subject(self) -> str:
+        """Its channel."""
+        return f"CH{self.channel}"
+
 
 STATIONS: Final[Section[StationPlan]] = Section(
     "stations", StationPlan, "the wayside ranging stations"

@@ -8,7 +8,10 @@ from typing import Any, Final
 import numpy as np
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
+from rail_corridor.equipment.map_scene import MapMarkers, MapScene
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
+from rail_corridor.equipment.run_figures import RunFigures
 from rail_corridor.equipment.subsystem import PlanContext, SectionOption, Subsystem
 from rail_corridor.run_data import RecordSpec, RunData, in_one_message, per_train
 from rail_corridor.scenario.model import Scenario
@@ -129,6 +132,24 @@ class Ranging(Subsystem):
     def tables(self, report: Mapping[str, Any]) -> Iterable[RenderableType]:
         """See `Subsystem.tables`."""
         yield ranging_table(report)
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import RangingView  # wanted by the live page only
+
+        return RangingView()
+
+    def run_figures(self) -> RunFigures:
+        """See `Subsystem.run_figures`."""
+        from .run_figures import RangingFigures  # wanted by the figures only
+
+        return RangingFigures()
+
+    def map_markers(self, scene: MapScene) -> MapMarkers:
+        """See `Subsystem.map_markers`."""
+        from .map_markers import position_markers  # wanted by the report only
+
+        return position_markers(scene)
 
 
 RANGING: Final = Ranging()

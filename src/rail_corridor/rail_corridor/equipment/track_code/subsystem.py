@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext, Subsystem, Supervision
 from rail_corridor.run_data import RecordSpec, RunData, per_train
@@ -133,6 +134,12 @@ class TrackCode(Subsystem):
         table = code_table(report["trains"])
         if table is not None:
             yield table
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import TrackCodeView  # wanted by the live page only
+
+        return TrackCodeView()
 
 
 TRACK_CODE: Final = TrackCode()

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext, Subsystem
 from rail_corridor.run_data import RecordSpec, RunData, in_one_message, per_train
@@ -86,6 +87,12 @@ class TrainBus(Subsystem):
         table = bus_table(report["trains"])
         if table is not None:
             yield table
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import TrainBusView  # wanted by the live page only
+
+        return TrainBusView()
 
 
 TRAIN_BUS: Final = TrainBus()

@@ -140,6 +140,11 @@ class NetworkThreats(TimedFault):
         default=LONGEST_DELAY_S, description="a delay is drawn evenly from 0 to this [s]"
     )
 
+    @property
+    def subject(self) -> str:
+        """The threats."""
+        return ", ".join(threat.value for threat in self.threats)
+
 
 CBTC: Final[Section[CbtcPlan | None]] = Section(
     "cbtc", CbtcPlan | None, "train control by radio, which trains obey; null = none", None

@@ -7,7 +7,9 @@ from typing import Any, Final
 
 from rich.console import RenderableType
 
+from rail_corridor.equipment.live import LiveView
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
+from rail_corridor.equipment.run_figures import RunFigures
 from rail_corridor.equipment.subsystem import PlanContext, Subsystem, Supervision
 from rail_corridor.run_data import RecordSpec, RunData, in_one_message, per_train
 from rail_corridor.scenario.model import Scenario
@@ -142,6 +144,18 @@ class TrainRadio(Subsystem):
         line = threat_line(report)
         if line is not None:
             yield line
+
+    def live(self) -> LiveView:
+        """See `Subsystem.live`."""
+        from .cards import TrainRadioView  # wanted by the live page only
+
+        return TrainRadioView()
+
+    def run_figures(self) -> RunFigures:
+        """See `Subsystem.run_figures`."""
+        from .run_figures import TrainRadioFigures  # wanted by the figures only
+
+        return TrainRadioFigures()
 
 
 TRAIN_RADIO: Final = TrainRadio()

@@ -1,6 +1,6 @@
 // What grows with time: the time-distance chart, and the error of one train's position.
 
-import { clock, font, pairColours, prepare, theme, ticks, timeTicks } from '/assets/theme.js';
+import { clock, font, groupColours, prepare, theme, ticks, timeTicks } from '/assets/theme.js';
 import { extent, offsets } from '/assets/line.js';
 
 // `rows` are [time, place of each train], a place [track, estimate, sigma, truth] or null.
@@ -27,13 +27,13 @@ export function drawTimeDistance(canvas, line, rows, names, options) {
   }
   text(pen, colours.soft, 'simulated time [min:s]', left + plotW / 2, height - 5, 'center');
   upright(pen, colours.soft, 'distance along the line [km]', 12, top + plotH / 2);
-  const pairs = pairColours(line.zones || []);
-  for (const zone of line.zones || []) {
-    const track = (line.tracks || []).find((t) => t.name === zone.track);
+  const groups = groupColours(line);
+  for (const each of (line.rows || []).filter((row) => row.on_track).flatMap((row) => row.stretches)) {
+    const track = (line.tracks || []).find((t) => t.name === each.track);
     if (!track || track.from) continue;
-    const u0 = from.get(zone.track);
-    pen.fillStyle = pairs.get(zone.downlink).colour;
-    pen.fillRect(left - 8, y(u0 + zone.end_m) + 0.5, 6, Math.max(1, y(u0 + zone.start_m) - y(u0 + zone.end_m) - 1));
+    const u0 = from.get(each.track);
+    pen.fillStyle = groups.get(each.group || 0).colour;
+    pen.fillRect(left - 8, y(u0 + each.end_m) + 0.5, 6, Math.max(1, y(u0 + each.start_m) - y(u0 + each.end_m) - 1));
   }
   const ends = [];
   pen.save();
@@ -81,17 +81,18 @@ function trace(pen, rows, point, colour, thick, dash) {
   return last;
 }
 
-// Estimate minus truth over the last minutes, with what it claims: of phase ranging by two sigma,
-// of the localizer (`options.located`) by its interval.
+// Estimate minus truth over the last minutes, with what it claims: the measured position by two
+// sigma, the estimate number `options.trace` (from 0) by its interval.
 export function drawError(canvas, rows, index, options) {
   const colours = theme(options.dark);
   const { pen, width, height } = prepare(canvas, 132);
+  const traced = options.trace >= 0;
   const [left, right, top, bottom] = [46, 10, 8, 32];
   const [plotW, plotH] = [width - left - right, height - top - bottom];
   const t1 = rows.length ? rows[rows.length - 1][0] : 0;
   const t0 = Math.max(rows.length ? rows[0][0] : 0, t1 - 120);
   const points = rows.filter((row) => row[0] >= t0 - 1e-9 && row[index + 1])
-    .map((row) => (options.located ? locatedPoint : rangedPoint)(row[0], row[index + 1]))
+    .map((row) => (traced ? tracedPoint(row[0], row[index + 1], options.trace) : measuredPoint(row[0], row[index + 1])))
     .filter(Boolean);
   const most = Math.max(0.2, ...points.map((p) => Math.max(Math.abs(p.e || 0), Math.min(p.high, 50), Math.min(-p.low, 50))));
   const x = (t) => left + ((t - t0) / Math.max(t1 - t0, 10)) * plotW;
@@ -109,7 +110,7 @@ export function drawError(canvas, rows, index, options) {
   upright(pen, colours.soft, 'error [m]', 11, top + plotH / 2);
   pen.save();
   pen.beginPath(); pen.rect(left, top, plotW, plotH); pen.clip();
-  pen.fillStyle = options.located ? colours.shade : colours.band;
+  pen.fillStyle = traced ? colours.shade : colours.band;
   for (let k = 1; k < points.length; k += 1) {
     const [a, b] = [points[k - 1], points[k]];
     if (b.t - a.t > 5) continue;
@@ -118,7 +119,7 @@ export function drawError(canvas, rows, index, options) {
     pen.fill();
   }
   rule(pen, { faint: colours.soft }, left, y(0), left + plotW, y(0));
-  pen.strokeStyle = options.located ? colours.located : colours.pick;
+  pen.strokeStyle = traced ? colours.claim : colours.pick;
   pen.lineWidth = 1.8;
   pen.beginPath();
   let before = null;
@@ -131,13 +132,14 @@ export function drawError(canvas, rows, index, options) {
   if (!points.length) text(pen, colours.soft, 'no position known', left + plotW / 2, top + plotH / 2 - 8, 'center');
 }
 
-function rangedPoint(t, [, estimate, sigma, truth]) {
+function measuredPoint(t, [, estimate, sigma, truth]) {
   if (estimate == null) return null;
   return { t, e: truth == null ? null : estimate - truth, low: -2 * sigma, high: 2 * sigma };
 }
 
-// The interval of a localizer is about the truth: whether it holds it is whether it holds zero.
-function locatedPoint(t, [, , , , error, low, high]) {
+// An interval is about the truth: whether it holds it is whether it holds zero.
+function tracedPoint(t, place, trace) {
+  const [error, low, high] = place.slice(4 + 3 * trace, 7 + 3 * trace);
   return error == null ? null : { t, e: error, low, high };
 }
 

@@ -2,9 +2,10 @@
 // Vue and Quasar come with NiceGUI; nothing is fetched from anywhere else.
 
 import { drawError, drawTimeDistance } from '/assets/chart.js';
-import { drawMap, drawStrip, extent, offsets, placeOf } from '/assets/line.js';
+import { drawStrip, extent, offsets, placeOf } from '/assets/line.js';
+import { drawMap } from '/assets/map.js';
 import { drawPlane, drawSpectrum, drawTime } from '/assets/scope.js';
-import { clock, engineering, pairColours } from '/assets/theme.js';
+import { clock, engineering, groupColours } from '/assets/theme.js';
 import { template } from '/assets/template.js';
 
 const ASK_MS = 210;
@@ -19,29 +20,51 @@ const STATUS = {
   ended: 'run ended',
   gone: 'the corridor has gone',
 };
-const TABS = [
-  { name: 'distance', label: 'Time–distance' },
-  { name: 'scope', label: 'Scope' },
-  { name: 'codes', label: 'Track codes' },
-  { name: 'telegrams', label: 'Telegrams' },
-  { name: 'health', label: 'Health' },
-  { name: 'faults', label: 'Faults' },
-];
+// Between the first two and the last two stand the panels of the equipment.
+const TABS = [{ name: 'distance', label: 'Time–distance' }, { name: 'scope', label: 'Scope' }];
+const LAST_TABS = [{ name: 'health', label: 'Health' }, { name: 'faults', label: 'Faults' }];
+const MEASURED = -1; // of the estimates whose error can be drawn: the measured position
 
 export default {
   template,
   data() {
     return {
-      tabs: TABS, tab: 'distance', status: 'connecting', frame: {}, line: {}, lists: { waveforms: [], equipment: [] },
+      tab: 'distance', status: 'connecting', frame: {}, line: {}, lists: { waveforms: [], equipment: [] },
       health: { status: [], failed: [], events: [] }, telegrams: [], scope: null, scopeTopic: null, antenna: 0, zoom: 16,
       waveformFilter: '', train: '', span: 0, asMap: false, last: 0, help: false, dark: false,
-      errorOf: 'ranged', wish: '', busy: {}, onlyPicked: false, domain: null, since: 0,
+      errorOf: MEASURED, wish: '', busy: {}, onlyPicked: false, domain: null, since: 0,
     };
   },
   computed: {
     trains() { return this.frame.trains || []; },
     picked() { return this.trains.find((train) => train.name === this.train) || null; },
-    pairs() { return [...pairColours(this.line.zones || []).values()]; },
+    panels() { return this.line.panels || []; },
+    tabs() { return [...TABS, ...this.panels, ...LAST_TABS]; },
+    panel() { return this.panels.find((panel) => panel.name === this.tab) || null; },
+    panelCards() {
+      const topics = new Set((this.frame.panel || {}).cards || []);
+      return (this.frame.cards || []).filter((card) => topics.has(card.topic));
+    },
+    groups() { return groupColours(this.line); },
+    rowLegend() {
+      return (this.line.rows || []).filter((row) => !row.on_track)
+        .map((row) => ({ name: row.name, sign: row.stretches.length ? 'filled' : row.symbol, text: row.legend }));
+    },
+    intervalLegend() {
+      return [...new Set(this.trains.flatMap((train) => train.intervals || []).map((each) => each.label))];
+    },
+    columns() {
+      return (this.line.columns || []).filter((column) => column.always || this.trains.some((train) => train.cells[column.key]));
+    },
+    traces() {
+      const measured = this.line.position_label || 'measured';
+      const there = (k) => this.trains.some((_, train) => this.hasTrace(train, k));
+      return [
+        { label: measured, value: MEASURED, caption: `Error of ${measured}, measured minus true; shaded: the ± 2σ it claims` },
+        ...(this.line.traces || []).map((trace, k) => ({ ...trace, value: k })).filter((trace) => there(trace.value)),
+      ];
+    },
+    traced() { return this.traces.find((trace) => trace.value === this.errorOf) || this.traces[0]; },
     statusText() {
       const rate = this.frame.rate;
       if (this.status === 'running') return rate == null ? 'running' : `running at ${rate < 10 ? rate.toFixed(1) : Math.round(rate)} × real time`;
@@ -58,11 +81,6 @@ export default {
       if (this.status === 'ended') return 'The run has come to its end. What is shown is its last state; a new run is followed by itself.';
       return '';
     },
-    hasCircuits() { return (this.line.circuits || []).length > 0; },
-    hasReferences() { return (this.line.references || []).length > 0; },
-    hasLocated() { return this.trains.some((train) => train.located); },
-    showLocated() { return this.errorOf === 'located' && this.hasLocated; },
-    hasBases() { return (this.line.bases || []).length > 0; },
     hasAuthority() { return this.trains.some((train) => train.end_m != null); },
     supervised() { return this.trains.some((train) => train.permitted_kmh !== undefined); },
     waveforms() {
@@ -79,17 +97,15 @@ export default {
     },
     faults() {
       return (this.line.faults || []).map((fault) => {
-        const what = fault.train || fault.station || fault.circuit || fault.base || (fault.threats || []).join(', ') || (fault.channel ? `CH${fault.channel}` : '');
         const now = this.frame.t >= fault.from_s && this.frame.t < fault.to_s;
         const over = this.frame.t >= fault.to_s;
-        return { kind: fault.kind.replace(/_/g, ' '), what, fault, state: now ? 'now' : over ? 'over' : 'to come' };
+        return { kind: fault.kind.replace(/_/g, ' '), what: fault.subject, fault, state: now ? 'now' : over ? 'over' : 'to come' };
       });
     },
     shownTelegrams() {
       const about = (line) => line.from === this.train || line.to === this.train;
       return (this.onlyPicked ? this.telegrams.filter(about) : this.telegrams).slice(0, 120);
     },
-    codesOnBoard() { return (this.frame.cards || []).filter((card) => card.topic.endsWith('/track_code/message')); },
     kindOfPlane() {
       const plane = this.scope && this.scope.plane;
       if (!plane || plane.kind === 'samples') return 'Samples in the I/Q plane';
@@ -99,7 +115,8 @@ export default {
     },
   },
   watch: {
-    tab() { this.writeHash(); this.soon(); },
+    tab() { this.telegrams = []; this.writeHash(); this.soon(); },
+    tabs() { if (!this.tabs.some((tab) => tab.name === this.tab)) this.tab = 'distance'; },
     asMap() { this.draw(); },
     span() { this.draw(); },
     errorOf() { this.draw(); },
@@ -153,7 +170,8 @@ export default {
     // What is looked at stands in the address, to be kept or passed on.
     readHash() {
       const values = new URLSearchParams(window.location.hash.slice(1));
-      if (TABS.some((tab) => tab.name === values.get('tab'))) this.tab = values.get('tab');
+      // Which panels there are is known with the first message.
+      if (values.get('tab') && (!this.line.panels || this.tabs.some((tab) => tab.name === values.get('tab')))) this.tab = values.get('tab');
       if (values.get('train')) this.train = values.get('train');
       if (values.get('topic')) this.scopeTopic = values.get('topic');
     },
@@ -188,7 +206,7 @@ export default {
       this.generation = generation;
       if (message.lists) { this.lists = Object.freeze(message.lists); this.have.lists = message.lists.version; }
       if (message.health) { this.health = Object.freeze(message.health); this.have.health = message.health.version; }
-      if (message.telegrams && message.telegrams.length) this.telegrams = [...message.telegrams.reverse(), ...this.telegrams].slice(0, 400);
+      if (this.panel && this.panel.log && message.telegrams && message.telegrams.length) this.telegrams = [...message.telegrams.reverse(), ...this.telegrams].slice(0, 400);
       this.scope = message.scope ? Object.freeze(message.scope) : null;
       this.frame = Object.freeze(message);
       const names = message.trains.map((train) => train.name);
@@ -213,7 +231,7 @@ export default {
         drawTimeDistance(distance, this.line, this.rows, names, { ...options, last_s: this.last, height: Math.max(280, Math.min(460, 0.44 * window.innerHeight)) });
       }
       const index = names.indexOf(this.train);
-      if (error && error.clientWidth && index >= 0) drawError(error, this.rows, index, { ...options, located: this.showLocated });
+      if (error && error.clientWidth && index >= 0) drawError(error, this.rows, index, { ...options, trace: this.traced.value });
       const shown = this.scope;
       if (shown && shown.time && time && time.clientWidth) {
         drawTime(time, shown, this.dark);
@@ -255,23 +273,21 @@ export default {
       const text = Math.abs(value).toFixed(digits);
       return `${Number(text) === 0 ? '' : value > 0 ? '+' : '−'}${text}`;
     },
-    onBoard({ on, located }) {
-      if (!on || !located) return '–';
-      if (located.gone) return 'gone';
-      return located.at_m == null ? 'not known' : `± ${located.protection_m.toFixed(1)}`;
+    cell(train, column) {
+      const [text = '–', tone = '', note = '', group = null] = (train.on && train.cells[column.key]) || [];
+      return { text, tone, note, group };
     },
-    onBoardClass({ on, located }) {
-      if (!on || !located) return '';
-      if (located.gone || located.status === 'unavailable' || located.holds === false) return 'bad';
-      return located.status === 'unmonitored' || located.left_out.length ? 'warned' : '';
-    },
+    // Whether a cell is the last of a row that is too short.
+    filling(row, k) { return k === row.length - 1 && row.length < this.frame.panel.headings.length; },
+    // Whether there is anything of a trace of a train.
+    hasTrace(train, trace) { return this.rows.some((row) => row[train + 1] && row[train + 1].length > 4 + 3 * trace); },
     braking(train) {
       if (train.brake === 'emergency_brake') return 'emergency brake';
       if (train.brake === 'service_brake') return 'service brake';
       return train.brake === 'warning' ? 'warning' : '';
     },
-    pairOf(train) {
-      const found = pairColours(this.line.zones || []).get(train.down);
+    colourOf(group) {
+      const found = this.groups.get(group);
       return found ? { background: found.colour, color: found.text } : {};
     },
     gauge(card) {

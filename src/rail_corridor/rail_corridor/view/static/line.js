@@ -1,6 +1,6 @@
-// The line to scale: as a strip along the chainage, or as a map.
+// The line to scale: as a strip along the chainage.
 
-import { engineering, font, levels, pairColours, prepare, theme, ticks } from '/assets/theme.js';
+import { font, groupColours, levels, prepare, theme, ticks } from '/assets/theme.js';
 
 const SIDE = 14; // px kept free to either side
 
@@ -41,16 +41,16 @@ export function drawStrip(canvas, line, frame, options) {
   const from = offsets(line);
   const whole = extent(line);
   const rows = line.tracks || [];
-  const circuits = (line.circuits || []).length > 0;
-  const bases = (line.bases || []).length > 0;
-  const references = (line.references || []).length > 0;
-  const rowHeight = 110 + (circuits ? 22 : 0) + (bases ? 16 : 0) + (references ? 16 : 0);
+  const onTrack = (line.rows || []).filter((row) => row.on_track);
+  const below = (line.rows || []).filter((row) => !row.on_track);
+  const rowHeight = 110 + below.reduce((sum, row) => sum + heightOf(row), 0);
   const { pen, width, height } = prepare(canvas, rows.length * rowHeight + 30);
   const span = options.span_m || whole;
   const first = options.span_m ? options.centre_m - span / 2 : 0;
   const scale = (width - 2 * SIDE) / span;
   const x = (u) => SIDE + (u - first) * scale;
-  const pairs = pairColours(line.zones || []);
+  const groups = groupColours(line);
+  const out = new Set([...(frame.off || []), ...(frame.failed || [])]);
   const hits = [];
   axis(pen, colours, x, first, first + span, width, height, rows.length * rowHeight);
   rows.forEach((track, row) => {
@@ -66,12 +66,18 @@ export function drawStrip(canvas, line, frame, options) {
     pen.fillRect(labelX - 3, top + 2, pen.measureText(label).width + 6, 15);
     pen.fillStyle = colours.soft;
     pen.fillText(label, labelX, top + 13);
-    zones(pen, colours, line, track, u0, x, yBar, width, pairs, options);
-    stations(pen, colours, line, frame, track, u0, x, yBar, width);
+    const place = { track, u0, x, width, out };
+    bed(pen, colours, onTrack, yBar, place);
+    for (const each of onTrack) {
+      coloured(pen, each, groups, yBar, place);
+      posts(pen, colours, each, stateOf(frame, each), yBar, place);
+    }
     let y = yBar + 36;
-    if (circuits) { drawCircuits(pen, colours, line, frame, track, u0, x, y, width); y += 22; }
-    if (bases) { drawBases(pen, colours, line.bases, 'cbtc', triangle, frame, track, u0, x, y, width); y += 16; }
-    if (references) drawBases(pen, colours, line.references, 'reference', diamond, frame, track, u0, x, y, width);
+    for (const each of below) {
+      stretches(pen, colours, each, stateOf(frame, each), y, place);
+      marks(pen, colours, each, stateOf(frame, each), y + (each.stretches.length ? 22 : 0), place);
+      y += heightOf(each);
+    }
     trains(pen, colours, line, frame, track, u0, x, top, scale, options, hits, width);
   });
   canvas.dataset.trains = hits.length;
@@ -103,24 +109,37 @@ function junction(pen, colours, at, yBar, rowHeight) {
   pen.setLineDash([]);
 }
 
-function zones(pen, colours, line, track, u0, x, y, width, pairs, options) {
-  pen.fillStyle = colours.line;
-  const starts = (line.zones || []).filter((zone) => zone.track === track.name).map((zone) => zone.start_m);
+// Marks stand below the stretches of their row.
+const heightOf = (row) => (row.stretches.length ? 22 : 0) + (row.marks.length ? 16 : 0);
+
+// State of each element of a row by its name: [word, active, tone].
+function stateOf(frame, row) {
+  return new Map(Object.entries((frame.states || {})[row.name] || {}));
+}
+
+// The track itself, up to where something is drawn onto it.
+function bed(pen, colours, rows, y, { track, u0, x, width }) {
+  const starts = rows.flatMap((row) => row.stretches).filter((each) => each.track === track.name).map((each) => each.start_m);
   const left = Math.max(0, x(u0));
   const right = Math.min(width, x(u0 + (starts.length ? Math.min(...starts) : track.length_m)));
+  pen.fillStyle = colours.line;
   pen.fillRect(left, y + 6, Math.max(0, right - left), 4);
-  for (const zone of line.zones || []) {
-    if (zone.track !== track.name) continue;
-    const [a, b] = [x(u0 + zone.start_m), x(u0 + zone.end_m)];
+}
+
+// Stretches drawn onto the track in the colours of their groups.
+function coloured(pen, row, groups, y, { track, u0, x, width }) {
+  for (const stretch of row.stretches) {
+    if (stretch.track !== track.name) continue;
+    const [a, b] = [x(u0 + stretch.start_m), x(u0 + stretch.end_m)];
     if (b < 0 || a > width) continue;
-    const pair = pairs.get(zone.downlink);
-    pen.fillStyle = pair.colour;
+    const group = groups.get(stretch.group || 0);
+    pen.fillStyle = group.colour;
     pen.fillRect(a + 0.5, y, Math.max(1, b - a - 1), 16);
     const [shownA, shownB] = [Math.max(a, 0), Math.min(b, width)];
     pen.font = font(11, true);
-    const text = shownB - shownA > 120 ? `${zone.name}: ${pair.label}` : pair.label;
+    const text = shownB - shownA > 120 ? `${stretch.name}: ${group.label}` : group.label;
     if (pen.measureText(text).width + 8 < shownB - shownA) {
-      pen.fillStyle = pair.text;
+      pen.fillStyle = group.text;
       pen.textAlign = 'center';
       pen.fillText(text, (shownA + shownB) / 2, y + 12.5);
       pen.textAlign = 'left';
@@ -128,29 +147,31 @@ function zones(pen, colours, line, track, u0, x, y, width, pairs, options) {
   }
 }
 
-function stations(pen, colours, line, frame, track, u0, x, y, width) {
-  const out = new Set([...(frame.off || []), ...(frame.failed || [])]);
-  const found = (line.stations || []).filter((s) => s.track === track.name
-    || (line.zones || []).some((z) => z.station === s.name && z.track === track.name));
+// Marks that stand on the track, their names below it where there is room.
+function posts(pen, colours, row, states, y, { track, u0, x, width, out }) {
   pen.font = font(11);
   let last = -Infinity;
-  for (const station of found) {
-    const zone = (line.zones || []).find((z) => z.station === station.name && z.track === track.name);
-    const at = x(u0 + (station.track === track.name || !zone ? station.at_m : zone.start_m));
-    if (at < -20 || at > width + 20) continue;
-    const dead = out.has(`/wayside/${station.name}`);
-    pen.fillStyle = dead ? colours.bad : colours.ink;
+  for (const mark of row.marks) {
+    const at = x(u0 + mark.at_m);
+    if (mark.track !== track.name || at < -20 || at > width + 20) continue;
+    const { bad, text } = wording(mark, states, out);
+    pen.fillStyle = bad ? colours.bad : colours.ink;
     pen.fillRect(at - 1, y + 16, 2, 7);
-    if (dead) cross(pen, at, y + 8, 7, colours.bad);
-    const text = dead ? `${station.name} off` : station.name;
+    if (out.has(mark.node)) cross(pen, at, y + 8, 7, colours.bad);
     const half = pen.measureText(text).width / 2;
-    if (at - half > last + 6 || dead) {
+    if (at - half > last + 6 || bad) {
       pen.textAlign = 'center';
       pen.fillText(text, Math.max(half + 2, Math.min(width - half - 2, at)), y + 34);
       pen.textAlign = 'left';
       last = at + half;
     }
   }
+}
+
+// Name of a mark with the word for its state; one whose node is off or failed is off.
+function wording(mark, states, out) {
+  const [word, , tone] = out.has(mark.node) ? ['off', true, 'bad'] : states.get(mark.name) || ['', false, ''];
+  return { bad: tone === 'bad', text: word ? `${mark.name} ${word}` : mark.name };
 }
 
 function cross(pen, x, y, size, colour) {
@@ -162,21 +183,22 @@ function cross(pen, x, y, size, colour) {
   pen.stroke();
 }
 
-function drawCircuits(pen, colours, line, frame, track, u0, x, y, width) {
-  const state = new Map((frame.circuits || []).map((c) => [c.name, c.occupied]));
-  for (const circuit of line.circuits) {
-    if (circuit.track !== track.name) continue;
-    const [a, b] = [x(u0 + circuit.start_m), x(u0 + circuit.end_m)];
+// A row of stretches below the track: outlines, filled where they are active.
+function stretches(pen, colours, row, states, y, { track, u0, x, width }) {
+  for (const stretch of row.stretches) {
+    if (stretch.track !== track.name) continue;
+    const [a, b] = [x(u0 + stretch.start_m), x(u0 + stretch.end_m)];
     if (b < 0 || a > width) continue;
-    const occupied = state.get(circuit.name);
-    pen.strokeStyle = pen.fillStyle = colours.soft;
+    const [word, active, tone] = states.get(stretch.name) || ['', false, ''];
+    const colour = tone === 'bad' ? colours.bad : colours.ink;
+    pen.strokeStyle = colours.soft;
     pen.lineWidth = 1;
     pen.strokeRect(a + 1.5, y + 4.5, Math.max(1, b - a - 3), 7);
-    if (occupied) { pen.fillStyle = colours.ink; pen.fillRect(a + 1, y + 4, Math.max(1, b - a - 2), 8); }
+    if (active) { pen.fillStyle = colour; pen.fillRect(a + 1, y + 4, Math.max(1, b - a - 2), 8); }
     pen.font = font(10);
-    const text = occupied ? `${circuit.name} occupied` : circuit.name;
+    const text = word ? `${stretch.name} ${word}` : stretch.name;
     if (pen.measureText(text).width + 10 < b - a) {
-      pen.fillStyle = occupied ? colours.ink : colours.soft;
+      pen.fillStyle = word ? colour : colours.soft;
       pen.textAlign = 'center';
       pen.fillText(text, (a + b) / 2, y + 22);
       pen.textAlign = 'left';
@@ -184,27 +206,29 @@ function drawCircuits(pen, colours, line, frame, track, u0, x, y, width) {
   }
 }
 
-function triangle(pen, at, y) {
-  pen.beginPath(); pen.moveTo(at, y + 1); pen.lineTo(at - 5, y + 11); pen.lineTo(at + 5, y + 11); pen.fill();
-}
+const SYMBOLS = {
+  tick(pen, at, y) { pen.fillRect(at - 1, y + 1, 2, 10); },
+  triangle(pen, at, y) {
+    pen.beginPath(); pen.moveTo(at, y + 1); pen.lineTo(at - 5, y + 11); pen.lineTo(at + 5, y + 11); pen.fill();
+  },
+  diamond(pen, at, y) {
+    pen.beginPath(); pen.moveTo(at, y + 1); pen.lineTo(at - 5, y + 6); pen.lineTo(at, y + 11); pen.lineTo(at + 5, y + 6); pen.fill();
+  },
+  circle(pen, at, y) { pen.beginPath(); pen.arc(at, y + 6, 4.5, 0, 7); pen.fill(); },
+  square(pen, at, y) { pen.fillRect(at - 4, y + 2, 8, 8); },
+};
 
-function diamond(pen, at, y) {
-  pen.beginPath(); pen.moveTo(at, y + 1); pen.lineTo(at - 5, y + 6); pen.lineTo(at, y + 11); pen.lineTo(at + 5, y + 6); pen.fill();
-}
-
-// Base stations of the train radio, or reference stations of the Doppler positions.
-function drawBases(pen, colours, all, node, sign, frame, track, u0, x, y, width) {
-  const out = new Set([...(frame.off || []), ...(frame.failed || [])]);
+// A row of marks below the track, each with its name.
+function marks(pen, colours, row, states, y, { track, u0, x, width, out }) {
+  const sign = SYMBOLS[row.symbol] || SYMBOLS.tick;
   pen.font = font(10);
-  for (const base of all) {
-    if (base.track !== track.name) continue;
-    const at = x(u0 + base.at_m);
-    if (at < 0 || at > width) continue;
-    const dead = out.has(`/wayside/${base.name}/${node}`);
-    pen.fillStyle = dead ? colours.bad : colours.soft;
+  for (const mark of row.marks) {
+    const at = x(u0 + mark.at_m);
+    if (mark.track !== track.name || at < 0 || at > width) continue;
+    const { bad, text } = wording(mark, states, out);
+    pen.fillStyle = bad ? colours.bad : colours.soft;
     sign(pen, at, y);
-    if (dead) cross(pen, at, y + 7, 6, colours.bad);
-    const text = dead ? `${base.name} off` : base.name;
+    if (out.has(mark.node)) cross(pen, at, y + 7, 6, colours.bad);
     const room = pen.measureText(text).width + 8;
     pen.fillText(text, at + room > width ? at - room : at + 8, y + 11);
   }
@@ -237,8 +261,9 @@ function trains(pen, colours, line, frame, track, u0, x, top, scale, options, hi
       }
     }
     body(pen, colours, at, y, about, train, place, scale, picked, width);
-    const located = train.located;
-    if (located && located.at_m != null && located.track === track.name) interval(pen, colours, x(u0 + located.low_m), x(u0 + located.high_m), y - 11);
+    for (const claim of train.intervals || []) {
+      if (claim.track === track.name) interval(pen, colours, x(u0 + claim.low_m), x(u0 + claim.high_m), y - 11);
+    }
     if (train.true && train.true[0] === track.name) {
       const truth = x(u0 + train.true[1]);
       pen.fillStyle = colours.truth;
@@ -284,10 +309,10 @@ function body(pen, colours, at, y, about, train, place, scale, picked, width) {
   if (place.known) pen.fill(); else pen.stroke();
 }
 
-// The interval in which the localizer says the train is.
+// An interval that is claimed to hold the train.
 function interval(pen, colours, low, high, y) {
   if (high - low < 3) return;
-  pen.strokeStyle = colours.located;
+  pen.strokeStyle = colours.claim;
   pen.lineWidth = 2;
   pen.beginPath();
   pen.moveTo(low, y - 4); pen.lineTo(low, y + 4);
@@ -303,103 +328,4 @@ function authority(pen, colours, from, to, y, picked) {
   pen.moveTo(from, y); pen.lineTo(to, y);
   pen.moveTo(to, y - 6); pen.lineTo(to, y + 4);
   pen.stroke();
-}
-
-// The map: north up, both axes to the same scale.
-export function drawMap(canvas, line, frame, options) {
-  const colours = theme(options.dark);
-  const paths = line.paths || {};
-  const points = Object.values(paths).flat();
-  const { pen, width, height } = prepare(canvas, Math.min(360, Math.max(240, canvas.clientWidth * 0.32)));
-  const hits = [];
-  if (!points.length) {
-    pen.fillStyle = colours.soft;
-    pen.font = font(13);
-    pen.fillText('No path of a track has been received.', SIDE, 30);
-    return hits;
-  }
-  const xs = points.map((p) => p[1]);
-  const ys = points.map((p) => p[2]);
-  const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-  const pad = 40;
-  const scale = Math.min((width - 2 * pad) / Math.max(x1 - x0, 1), (height - 2 * pad - 20) / Math.max(y1 - y0, 1));
-  const toX = (px) => width / 2 + (px - (x0 + x1) / 2) * scale;
-  const toY = (py) => (height - 20) / 2 - (py - (y0 + y1) / 2) * scale;
-  const lengths = new Map((line.tracks || []).map((t) => [t.name, t.length_m]));
-  const at = (track, chainage) => {
-    const path = paths[track];
-    if (!path) return null;
-    const share = Math.max(0, Math.min(1, chainage / (lengths.get(track) || 1)));
-    let k = Math.max(1, path.findIndex((p) => p[0] >= share));
-    if (k < 1) k = path.length - 1;
-    const [a, b] = [path[k - 1], path[k]];
-    const part = (share - a[0]) / Math.max(b[0] - a[0], 1e-9);
-    return [a[1] + (b[1] - a[1]) * part, a[2] + (b[2] - a[2]) * part];
-  };
-  const stroke = (track, low, high, colour, thick) => {
-    const size = lengths.get(track) || 1;
-    const inner = (paths[track] || []).filter((p) => p[0] * size > low && p[0] * size < high);
-    const chain = [at(track, low), ...inner.map((p) => [p[1], p[2]]), at(track, high)].filter(Boolean);
-    pen.strokeStyle = colour;
-    pen.lineWidth = thick;
-    pen.beginPath();
-    chain.forEach((p, k) => (k ? pen.lineTo(toX(p[0]), toY(p[1])) : pen.moveTo(toX(p[0]), toY(p[1]))));
-    pen.stroke();
-  };
-  const pairs = pairColours(line.zones || []);
-  for (const track of line.tracks || []) stroke(track.name, 0, track.length_m, colours.line, 2);
-  for (const zone of line.zones || []) stroke(zone.track, zone.start_m, zone.end_m, pairs.get(zone.downlink).colour, 7);
-  pen.font = font(11);
-  const names = [];
-  for (const station of line.stations || []) {
-    const [px, py] = [toX(station.position_m[0]), toY(station.position_m[1])];
-    pen.fillStyle = colours.ink;
-    pen.beginPath(); pen.arc(px, py, 2.5, 0, 7); pen.fill();
-    if (names.every(([nx, ny]) => Math.hypot(nx - px, ny - py) > 46)) {
-      pen.fillStyle = colours.soft;
-      pen.strokeStyle = colours.paper;
-      pen.lineWidth = 4;
-      pen.textAlign = 'center';
-      pen.strokeText(station.name, px, py + 20);
-      pen.fillText(station.name, px, py + 20);
-      names.push([px, py]);
-    }
-  }
-  pen.font = font(12, true);
-  const spots = (frame.trains || []).map((train) => {
-    const place = placeOf(train);
-    const spot = place && at(place.track, place.at);
-    return spot && { train, place, x: toX(spot[0]), y: toY(spot[1]), width: pen.measureText(train.name).width, first: train.name === options.train };
-  }).filter(Boolean);
-  const placed = levels(spots, 3);
-  for (const [k, { train, place, x: px, y: py }] of spots.entries()) {
-    const picked = train.name === options.train;
-    pen.fillStyle = pen.strokeStyle = picked ? colours.pick : colours.ink;
-    pen.lineWidth = 2;
-    pen.beginPath(); pen.arc(px, py, 7, 0, 7);
-    if (place.known) pen.fill(); else pen.stroke();
-    pen.lineWidth = 1.5;
-    pen.strokeStyle = colours.paper;
-    pen.beginPath(); pen.arc(px, py, 7, 0, 7); pen.stroke();
-    pen.font = font(12, true);
-    pen.textAlign = 'center';
-    pen.fillText(place.known ? train.name : `${train.name} ?`, Math.max(40, Math.min(width - 40, px)), py - 13 - 14 * Math.max(0, placed[k]));
-    hits.push({ name: train.name, x: px, y: py });
-  }
-  bar(pen, colours, scale, width, height);
-  canvas.dataset.trains = hits.length;
-  return hits;
-}
-
-function bar(pen, colours, scale, width, height) {
-  const { step } = ticks(0, 120 / scale, 2);
-  const y = height - 12;
-  pen.strokeStyle = pen.fillStyle = colours.soft;
-  pen.lineWidth = 2;
-  pen.beginPath();
-  pen.moveTo(SIDE, y - 4); pen.lineTo(SIDE, y); pen.lineTo(SIDE + step * scale, y); pen.lineTo(SIDE + step * scale, y - 4);
-  pen.stroke();
-  pen.textAlign = 'left';
-  pen.font = font(11);
-  pen.fillText(`${engineering(step, 'm')}, north is up`, SIDE + step * scale + 8, y + 1);
 }

@@ -41,29 +41,28 @@ export const template = `
       </div>
       <canvas ref="line" class="cv-canvas" role="img" aria-label="The line with its zones and trains; the table of trains says the same in words" @click="click"></canvas>
       <div class="cv-legend">
-        <span v-for="pair in pairs" :key="pair.label"><b class="swatch" :style="{background: pair.colour}"></b>zone on {{ pair.label }}</span>
+        <span v-for="[key, group] in groups" :key="key"><b class="swatch" :style="{background: group.colour}"></b>{{ group.legend }} {{ group.label }}</span>
         <span><b class="sign" :class="asMap ? 'dot' : 'train'"></b>train where it was measured</span>
         <span v-if="!asMap"><b class="sign truth"></b>where it truly is</span>
         <span v-if="!asMap"><b class="sign band"></b>± 2σ, to scale: see “5 m”</span>
         <span><b class="sign" :class="asMap ? 'ring' : 'unknown'"></b>position not known</span>
-        <span v-if="hasLocated && !asMap"><b class="sign interval"></b>interval of the localizer: see “100 m”</span>
+        <template v-if="!asMap"><span v-for="text in intervalLegend" :key="text"><b class="sign interval"></b>{{ text }}</span></template>
         <span v-if="hasAuthority && !asMap"><b class="sign grant"></b>movement authority</span>
-        <span v-if="hasCircuits && !asMap"><b class="sign occupied"></b>track circuit occupied</span>
-        <span v-if="hasBases && !asMap"><b class="sign base"></b>base station</span>
-        <span v-if="hasReferences && !asMap"><b class="sign reference"></b>reference station (Doppler)</span>
+        <template v-if="!asMap"><span v-for="row in rowLegend" :key="row.name"><b class="sign" :class="row.sign"></b>{{ row.text }}</span></template>
       </div>
     </section>
 
     <div class="cv-grid">
         <section class="cv-card cv-trains">
-          <h2>Trains <small>measured by phase ranging; error = measured − true; pick one</small></h2>
+          <h2>Trains <small>measured{{ line.position_label ? ' by ' + line.position_label : '' }}; error = measured − true; pick one</small></h2>
           <div class="cv-scroll trains">
             <table class="cv-table trains">
               <thead><tr>
                 <th>train</th><th class="num">position</th><th class="num">± 2σ <span class="unit">m</span></th>
                 <th class="num" title="position said, minus the truth">error <span class="unit">m</span></th>
-                <th v-if="hasLocated" class="num wide" title="what the localizer on board says from all sensors: the train is within so much, even if any one sensor is wrong">on board <span class="unit">m</span></th>
-                <th class="num"><span class="unit">km/h</span></th><th>channels</th>
+                <th v-for="column in columns.filter((c) => c.beside_position)" :key="column.key" class="num" :class="{wide: !column.always}" :title="column.hint">{{ column.heading }} <span class="unit">{{ column.unit }}</span></th>
+                <th class="num"><span class="unit">km/h</span></th>
+                <th v-for="column in columns.filter((c) => !c.beside_position)" :key="column.key" :class="{wide: !column.always}" :title="column.hint">{{ column.heading }} <span class="unit">{{ column.unit }}</span></th>
                 <th v-if="supervised" class="wide">permitted</th>
               </tr></thead>
               <tbody>
@@ -72,9 +71,9 @@ export const template = `
                   <td class="num" :class="{bad: item.on && !item.known}">{{ where(item) }}<span class="wide unit" v-if="item.known && (line.tracks || []).length > 1">&nbsp;{{ item.track }}</span></td>
                   <td class="num">{{ item.on && item.known ? (2 * item.sigma_m).toFixed(2) : '–' }}</td>
                   <td class="num">{{ item.on && item.known ? signed(item.error_m, 2) : '–' }}</td>
-                  <td v-if="hasLocated" class="num wide" :class="onBoardClass(item)">{{ onBoard(item) }}<div v-if="item.on && item.located && item.located.left_out.length" class="left-out">without {{ item.located.left_out.join(', ') }}</div></td>
+                  <td v-for="column in columns.filter((c) => c.beside_position)" :key="column.key" class="num" :class="[cell(item, column).tone, {wide: !column.always}]">{{ cell(item, column).text }}<div v-if="cell(item, column).note" class="note">{{ cell(item, column).note }}</div></td>
                   <td class="num">{{ item.on ? Math.abs(item.speed_kmh).toFixed(0) : '–' }}</td>
-                  <td><span class="pair" v-if="item.on && item.down" :style="pairOf(item)">CH{{ item.down }}/{{ item.up }}</span><span v-else>–</span></td>
+                  <td v-for="column in columns.filter((c) => !c.beside_position)" :key="column.key" :class="[cell(item, column).tone, {wide: !column.always}]"><span :class="{pair: cell(item, column).group != null}" :style="colourOf(cell(item, column).group)">{{ cell(item, column).text }}</span><div v-if="cell(item, column).note" class="note">{{ cell(item, column).note }}</div></td>
                   <td v-if="supervised" class="wide"><span v-if="item.permitted_kmh != null">{{ item.permitted_kmh }} km/h </span><span class="brake" v-if="braking(item)">{{ braking(item) }}</span></td>
                 </tr>
               </tbody>
@@ -84,12 +83,12 @@ export const template = `
         <section class="cv-card cv-picked" v-if="picked">
           <h2>{{ picked.name }} <small>what each sensor says</small></h2>
           <div class="cv-row">
-            <div class="cv-sub">{{ showLocated ? 'Error of the localizer, said minus true; shaded: the interval it claims, which must hold 0' : 'Error of phase ranging, measured minus true; shaded: the ± 2σ it claims' }}</div>
+            <div class="cv-sub">{{ traced.caption }}</div>
             <div class="cv-fill"></div>
-            <q-btn-toggle v-if="hasLocated" v-model="errorOf" unelevated no-caps padding="1px 9px" size="12px" toggle-color="primary" aria-label="Whose error is drawn"
-              :options="[{label: 'phase ranging', value: 'ranged'}, {label: 'localizer', value: 'located'}]"></q-btn-toggle>
+            <q-btn-toggle v-if="traces.length > 1" v-model="errorOf" unelevated no-caps padding="1px 9px" size="12px" toggle-color="primary" aria-label="Whose error is drawn"
+              :options="traces.map(({label, value}) => ({label, value}))"></q-btn-toggle>
           </div>
-          <canvas ref="error" class="cv-canvas" role="img" :aria-label="'Error over the last two minutes of ' + (showLocated ? 'the localizer' : 'phase ranging')"></canvas>
+          <canvas ref="error" class="cv-canvas" role="img" :aria-label="'Error over the last two minutes of ' + traced.label"></canvas>
           <div class="cv-sensors">
             <div v-for="card in frame.cards || []" :key="card.topic" class="sensor" :class="card.state">
               <div class="title">{{ card.title }}
@@ -116,7 +115,7 @@ export const template = `
 
         <div v-if="tab === 'distance'">
           <div class="cv-row">
-            <div class="cv-legend"><span><b class="sign path picked"></b>{{ train || 'picked train' }}</span><span><b class="sign path"></b>other trains, as measured</span><span><b class="sign path thin"></b>truth</span><span>edge: channel pair of the zone</span></div>
+            <div class="cv-legend"><span><b class="sign path picked"></b>{{ train || 'picked train' }}</span><span><b class="sign path"></b>other trains, as measured</span><span><b class="sign path thin"></b>truth</span><span v-if="groups.size">edge: colours as on the line</span></div>
             <div class="cv-fill"></div>
             <q-btn-toggle v-model="last" unelevated no-caps padding="1px 9px" size="12px" toggle-color="primary" :options="[{label: 'all', value: 0}, {label: 'last 5 min', value: 300}, {label: 'last min', value: 60}]"></q-btn-toggle>
           </div>
@@ -147,25 +146,26 @@ export const template = `
           </template>
         </div>
 
-        <div v-else-if="tab === 'codes'">
-          <p class="cv-sub" v-if="!hasCircuits">This corridor has no track circuits; “rail run follow_codes --rate 1” is one that has.</p>
-          <template v-else>
-            <h3>Decoded on board of {{ train }}</h3>
-            <div class="cv-sensors"><div class="sensor" v-for="card in codesOnBoard" :key="card.topic" :class="card.state"><dl><template v-for="(row, k) in card.rows" :key="k"><dt>{{ row[0] }}</dt><dd :class="{word: row[0] === 'word'}">{{ row[1] }} <span class="unit">{{ row[2] }}</span></dd></template></dl></div></div>
-            <h3>Sent by the circuits</h3>
-            <div class="cv-scroll"><table class="cv-table"><thead><tr><th>circuit</th><th></th><th class="num">level <span class="unit">dB</span></th><th class="num">permitted</th><th class="num">at its end</th><th class="num">block</th><th class="num">gradient</th></tr></thead>
-              <tbody><tr v-for="item in frame.circuits" :key="item.name" :class="{picked: item.occupied}"><td class="name">{{ item.name }}</td><td>{{ item.occupied == null ? 'not heard of' : item.occupied ? 'occupied' : 'clear' }}</td><td class="num">{{ item.level_db == null ? '–' : signed(item.level_db, 1).replace('+', '') }}</td>
-                <template v-if="item.code && item.code.length >= 4"><td class="num" v-for="k in [0, 1, 2, 3]" :key="k">{{ item.code[k][1] }} <span class="unit">{{ item.code[k][2] }}</span></td></template><td v-else colspan="4">no code sent</td></tr></tbody></table></div>
-          </template>
-        </div>
-
-        <div v-else-if="tab === 'telegrams'">
-          <p class="cv-sub" v-if="!hasBases">This corridor has no train radio; “rail run moving_block --rate 1” is one that has.</p>
+        <div v-else-if="panel && panel.log">
+          <p class="cv-sub" v-if="!panel.there">{{ panel.absent }}</p>
           <template v-else>
             <q-checkbox v-model="onlyPicked" dense size="sm" :label="'only those from or to ' + train"></q-checkbox>
             <div class="cv-scroll tall"><table class="cv-table telegrams"><thead><tr><th class="num">time</th><th>where seen</th><th>from → to</th><th>what</th><th class="num">no.</th></tr></thead>
               <tbody><tr v-for="item in shownTelegrams" :key="item.id"><td class="num">{{ clock(item.t, true) }}</td><td>{{ item.stage }}<br><small>{{ item.place }}</small></td><td>{{ item.from }} → {{ item.to }}</td><td><b>{{ item.kind }}</b> {{ item.text }}</td><td class="num">{{ item.seq }}</td></tr></tbody></table></div>
-            <p class="cv-sub">Contents as sent, unchecked: the viewer has no keys. One telegram is seen up to four times on its way.</p>
+            <p class="cv-sub">{{ panel.note }}</p>
+          </template>
+        </div>
+
+        <div v-else-if="panel">
+          <p class="cv-sub" v-if="frame.panel === null">{{ panel.absent }}</p>
+          <template v-else-if="frame.panel">
+            <template v-if="frame.panel.cards.length">
+              <h3>{{ frame.panel.cards_title }}</h3>
+              <div class="cv-sensors"><div class="sensor" v-for="card in panelCards" :key="card.topic" :class="card.state"><dl><template v-for="(row, k) in card.rows" :key="k"><dt>{{ row[0] }}</dt><dd :class="{word: row[0] === 'word'}">{{ row[1] }} <span class="unit">{{ row[2] }}</span></dd></template></dl></div></div>
+            </template>
+            <h3>{{ frame.panel.title }}</h3>
+            <div class="cv-scroll"><table class="cv-table"><thead><tr><th v-for="(heading, k) in frame.panel.headings" :key="k" :class="{num: k > 1}">{{ heading[0] }} <span class="unit">{{ heading[1] }}</span></th></tr></thead>
+              <tbody><tr v-for="(row, n) in frame.panel.rows" :key="n" :class="{picked: frame.panel.picked[n]}"><td v-for="(cell, k) in row" :key="k" :class="{name: k === 0, num: k > 1 && !filling(row, k)}" :colspan="filling(row, k) ? frame.panel.headings.length - k : 1">{{ cell[0] }} <span class="unit">{{ cell[1] }}</span></td></tr></tbody></table></div>
           </template>
         </div>
 
@@ -198,8 +198,7 @@ export const template = `
   </main>
 
   <q-dialog v-model="help"><q-card class="cv-help"><h2>What this page shows</h2>
-    <p>A railway line whose trains are located by radio. Wayside stations (<b>wrs</b>) stand along it; each watches the <b>zone</b> up to the next one and talks with the train in it on the zone’s pair of channels. Neighbouring zones use different pairs, so a train changes its channels as it goes.</p>
-    <p>The position of a train is <b>measured</b>, from the phase of a tone that goes to the train and back. The page shows what was measured and how sure the equipment says it is (± 2σ: the truth should lie inside 95 % of the time), and beside it the <b>truth</b>, which only the simulation knows. “off the truth” is the measured position minus the true one.</p>
+    <p v-for="text in line.introduction || []" :key="text">{{ text }}</p>
     <p>Pick a train in the table or on the line. “5 m” zooms until the uncertainty can be seen. Everything comes from ROS 2 topics, whose names stand under each sensor.</p>
     <p><b>stale</b>: the newest message is older than a few ticks. <b>gone</b>: nobody sends the topic any longer.</p>
     <q-btn v-close-popup flat no-caps color="primary" label="close"></q-btn></q-card></q-dialog>

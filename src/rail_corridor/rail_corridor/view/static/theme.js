@@ -5,32 +5,30 @@ const OKABE_ITO = {
   blue: '#0072B2', orange: '#E69F00', green: '#009E73', purple: '#CC79A7',
   sky: '#56B4E9', vermillion: '#D55E00', yellow: '#F0E442',
 };
-const PAIRS = ['blue', 'orange', 'green', 'purple', 'sky', 'vermillion', 'yellow'];
+const GROUPS = ['blue', 'orange', 'green', 'purple', 'sky', 'vermillion', 'yellow'];
 const DARK_TEXT_ON = new Set(['orange', 'sky', 'yellow', 'purple']);
 
 export function theme(dark) {
   return dark
     ? { ink: '#e8eaed', soft: '#a6adb8', faint: '#3a414c', paper: '#171a1f', truth: '#ffffff',
       pick: '#ff8c42', band: 'rgba(255,140,66,0.30)', grant: '#2fc59a', line: '#c3cad4',
-      i: '#56B4E9', q: '#E69F00', bad: '#ff7a5c', located: '#56B4E9', shade: 'rgba(86,180,233,0.28)', dark: true }
+      i: '#56B4E9', q: '#E69F00', bad: '#ff7a5c', claim: '#56B4E9', shade: 'rgba(86,180,233,0.28)', dark: true }
     : { ink: '#1d2229', soft: '#5b6470', faint: '#dfe3e8', paper: '#ffffff', truth: '#000000',
       pick: '#D55E00', band: 'rgba(213,94,0,0.22)', grant: '#00795a', line: '#414a57',
-      i: '#0072B2', q: '#B87400', bad: '#b93a12', located: '#0072B2', shade: 'rgba(0,114,178,0.20)', dark: false };
+      i: '#0072B2', q: '#B87400', bad: '#b93a12', claim: '#0072B2', shade: 'rgba(0,114,178,0.20)', dark: false };
 }
 
-// Colour of each downlink channel, in rising order of the channels.
-export function pairColours(zones) {
-  const pairs = new Map();
-  for (const zone of [...zones].sort((a, b) => a.downlink - b.downlink)) {
-    if (!pairs.has(zone.downlink)) {
-      const name = PAIRS[pairs.size % PAIRS.length];
-      pairs.set(zone.downlink, {
-        colour: OKABE_ITO[name], text: DARK_TEXT_ON.has(name) ? '#101317' : '#ffffff',
-        label: `CH${zone.downlink}/${zone.uplink}`,
-      });
+// Colour of each group of the stretches that are drawn onto the tracks, in rising order.
+export function groupColours(line) {
+  const groups = new Map();
+  const all = (line.rows || []).filter((row) => row.on_track).flatMap((row) => row.stretches.map((stretch) => ({ ...stretch, legend: row.legend })));
+  for (const { group = 0, group_label: label = '', legend } of all.sort((a, b) => (a.group || 0) - (b.group || 0))) {
+    if (!groups.has(group)) {
+      const name = GROUPS[groups.size % GROUPS.length];
+      groups.set(group, { colour: OKABE_ITO[name], text: DARK_TEXT_ON.has(name) ? '#101317' : '#ffffff', label, legend });
     }
   }
-  return pairs;
+  return groups;
 }
 
 // A canvas at the resolution of the screen; returns its context and its size in CSS pixels.

@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
+from rail_corridor.equipment.train_radio.symbols import BurstReader
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plan.announcement import announcement
 from rail_corridor.view.scope import scope
-from rail_corridor.view.symbols import BurstReader
 from rail_msgs_py.waveform import Waveform
 from rail_signals.train_radio.slots import RadioSlots
 
@@ -34,7 +34,7 @@ def block(reader: BurstReader, noise: float, gain: complex = 1e-3j) -> Waveform:
 
 
 def test_without_noise_every_symbol_lies_on_its_point(reader: BurstReader) -> None:
-    shown = scope(block(reader, 1e-6), bursts=reader)["plane"]
+    shown = scope(block(reader, 1e-6), readers=(reader,))["plane"]
     assert (shown["kind"], shown["constellation"], shown["slot"]) == ("symbols", "qpsk", 2)
     symbols = np.array(shown["i"]) + 1j * np.array(shown["q"])
     points = np.array(shown["points"]) @ (1, 1j)
@@ -44,7 +44,7 @@ def test_without_noise_every_symbol_lies_on_its_point(reader: BurstReader) -> No
 
 
 def test_noise_spreads_the_symbols_and_shows_in_the_ratio(reader: BurstReader) -> None:
-    shown = scope(block(reader, 0.1), bursts=reader)["plane"]
+    shown = scope(block(reader, 0.1), readers=(reader,))["plane"]
     symbols = np.array(shown["i"]) + 1j * np.array(shown["q"])
     points = np.array(shown["points"]) @ (1, 1j)
     spread = np.mean(np.abs(symbols[:, None] - points).min(axis=1) ** 2)

@@ -1,4 +1,4 @@
-"""Figures of tables as people read them: a label, a value and its unit, from the column's name."""
+"""Values of tables as people read them: a label, a value and its unit, from the column's name."""
 
 from __future__ import annotations
 
@@ -24,37 +24,38 @@ _UNITS: tuple[tuple[str, float, str, int], ...] = (
     ("_deg", 1.0, "°", 2),
 )
 _YES_NO = {"valid", "warning", "service_brake", "emergency_brake", "occupied", "on_line", "known"}
-_RATIOS = ("snr", "snr_down", "snr_up", "beacon_snr")
+#: Word in the names of columns that hold a ratio of powers.
+_RATIO = "snr"
 
 
-class Figure(NamedTuple):
-    """One figure as text; ``unit`` is empty where there is none."""
+class ShownValue(NamedTuple):
+    """One value as text; ``unit`` is empty where there is none."""
 
     label: str
     text: str
     unit: str
 
 
-def figure(column: str, value: float) -> Figure:
-    """A figure of a table as text.
+def shown_value(column: str, value: float) -> ShownValue:
+    """A value of a table as text.
 
-    >>> figure("speed_mps", 20.0)
-    Figure(label='speed', text='72.0', unit='km/h')
-    >>> figure("level_3_dbm", float("-inf"))
-    Figure(label='level 3', text='none', unit='')
+    >>> shown_value("speed_mps", 20.0)
+    ShownValue(label='speed', text='72.0', unit='km/h')
+    >>> shown_value("level_3_dbm", float("-inf"))
+    ShownValue(label='level 3', text='none', unit='')
     """
     if column in _YES_NO:
-        return Figure(_label(column), _yes_no(value), "")
-    if column in _RATIOS:
+        return ShownValue(_label(column), _yes_no(value), "")
+    if _RATIO in column.split("_") and not column.endswith("_db"):
         text = f"{10.0 * math.log10(value):.1f}" if 0.0 < value < math.inf else "none"
-        return Figure(_label(column), text, "dB" if text != "none" else "")
+        return ShownValue(_label(column), text, "dB" if text != "none" else "")
     for ending, factor, unit, digits in _UNITS:
         if column.endswith(ending):
             label = _label(column[: -len(ending)])
             if not math.isfinite(value):
-                return Figure(label, "unlimited" if value > 0.0 else "none", "")
-            return Figure(label, f"{value * factor:.{digits}f}".replace("-", "−"), unit)
-    return Figure(_label(column), f"{value:.6g}" if math.isfinite(value) else "none", "")
+                return ShownValue(label, "unlimited" if value > 0.0 else "none", "")
+            return ShownValue(label, f"{value * factor:.{digits}f}".replace("-", "−"), unit)
+    return ShownValue(_label(column), f"{value:.6g}" if math.isfinite(value) else "none", "")
 
 
 def _label(name: str) -> str:

@@ -1,11 +1,11 @@
-"""Telegrams of the train radio in words, newest first."""
+"""Telegrams of the train radio in words."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Final
 
+from rail_corridor.equipment.live_elements import LogEntry
 from rail_msgs_py.topics.train_radio import (
     DOWN_TELEGRAMS,
     RADIO_TELEGRAMS,
@@ -18,20 +18,18 @@ from rail_msgs_py.train_radio.telegrams import Telegrams
 from rail_msgs_py.train_radio.train_channel import CONTROLLER_IDENTITY
 from rail_msgs_py.train_radio.train_report import REPORT_BYTES, LocationReport
 
-from .wanted import kind_of
-
-MOST_LINES = 400
-#: Kind of topic -> what happens to a frame there.
-_STAGES = {
-    TRAIN_TELEGRAMS.pattern: "sent by train",
-    UP_TELEGRAMS.pattern: "received at base",
-    DOWN_TELEGRAMS.pattern: "sent to base",
-    RADIO_TELEGRAMS.pattern: "received on board",
-}
+#: Kind of topic, and what happens to a frame there.
+_STAGES: Final = (
+    (TRAIN_TELEGRAMS, "sent by train"),
+    (UP_TELEGRAMS, "received at base"),
+    (DOWN_TELEGRAMS, "sent to base"),
+    (RADIO_TELEGRAMS, "received on board"),
+)
+_PAYLOAD_MOST: Final = 32
 
 
-class TelegramLog:
-    """The last telegrams.
+class TelegramReader:
+    """Puts telegrams into words.
 
     Parameters
     ----------
@@ -43,55 +41,43 @@ class TelegramLog:
 
     def __init__(self, trains: Sequence[str] = (), tracks: Sequence[str] = ()) -> None:
         self._trains, self._tracks = tuple(trains), tuple(tracks)
-        self._lines: deque[dict[str, Any]] = deque(maxlen=MOST_LINES)
-        self._count = 0
 
-    def put(self, topic: str, raw: bytes) -> None:
-        """Add the telegrams of one message; bytes that are none are passed over."""
-        kind = kind_of(topic)
+    def entries(self, topic: str, raw: bytes) -> Iterator[LogEntry]:
+        """Telegrams of one message; none if its bytes are not telegrams."""
         try:
             batch = Telegrams.from_cdr(raw)
         except ValueError:
             return
+        stage, place = _seen_at(topic)
         for _, frame in batch.frames:
-            self._count += 1
-            self._lines.append(
-                {
-                    "id": self._count,
-                    "t": round(batch.stamp_ns * 1e-9, 3),
-                    "stage": _STAGES.get(kind.pattern if kind else "", ""),
-                    "place": topic.split("/")[3 if kind is DOWN_TELEGRAMS else 2]
-                    if topic.startswith("/wayside/")
-                    else topic.split("/")[1],
-                    **self.describe(frame),
-                }
-            )
+            yield self.describe(frame, batch.stamp_ns * 1e-9, stage, place)
 
-    def since(self, count: int) -> list[dict[str, Any]]:
-        """Lines that a reader lacks who has the first ``count`` of all."""
-        return [line for line in self._lines if line["id"] > count]
-
-    def describe(self, frame: bytes) -> dict[str, Any]:
+    def describe(
+        self, frame: bytes, time_s: float = 0.0, stage: str = "", place: str = ""
+    ) -> LogEntry:
         """From, to, kind, sequence number and contents of a frame.
 
         Nothing of it is checked: the viewer has no keys, and shows forged frames too.
         """
         if len(frame) != FRAME_BYTES:
-            return {"from": "?", "to": "?", "kind": "unreadable", "seq": 0, "text": ""}
+            return LogEntry(time_s, stage, place, "?", "?", "unreadable", 0, "")
         header = read_header(frame)
         kinds = {int(kind): kind.name.lower().replace("_", " ") for kind in Kind}
-        payload = payload_of(frame, min(header.length, 32))
+        payload = payload_of(frame, min(header.length, _PAYLOAD_MOST))
         try:
             text = self._contents(header.kind, payload)
         except ValueError as error:
             text = str(error)
-        return {
-            "from": self._end(header.source),
-            "to": self._end(header.destination),
-            "kind": kinds.get(header.kind, f"kind {header.kind}"),
-            "seq": header.sequence,
-            "text": text,
-        }
+        return LogEntry(
+            time_s,
+            stage,
+            place,
+            self._end(header.source),
+            self._end(header.destination),
+            kinds.get(header.kind, f"kind {header.kind}"),
+            header.sequence,
+            text,
+        )
 
     def _contents(self, kind: int, payload: bytes) -> str:
         if kind == Kind.LOCATION_REPORT and len(payload) == REPORT_BYTES:
@@ -123,3 +109,12 @@ class TelegramLog:
 
     def _track(self, segment: int) -> str:
         return self._tracks[segment] if segment < len(self._tracks) else f"segment {segment}"
+
+
+def _seen_at(topic: str) -> tuple[str, str]:
+    """What happens to a frame on a topic, and the train or base station where that is."""
+    for kind, stage in _STAGES:
+        if parts := kind.parts(topic):
+            (place,) = parts.values()
+            return stage, place
+    return "", ""

@@ -1,15 +1,13 @@
-"""What the localizer on board says of a train, in figures and words."""
+"""What the localizer on board says of a train, in values and words."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
+from rail_corridor.equipment.live_state import LiveState
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
-
-if TYPE_CHECKING:
-    from .live_state import Picture
 
 #: What a position is good for, as ``rail_signals.localizer.protection_level.Status`` counts it.
 STATUS = ("unavailable", "unmonitored", "protected")
@@ -21,7 +19,7 @@ _MEANING = {
 
 
 @dataclass(frozen=True)
-class Located:
+class LocalizerEstimate:
     """Answer of a localizer.
 
     Parameters
@@ -65,17 +63,21 @@ class Located:
         return f"{_MEANING[self.status]}{f' ({self.reason})' if self.reason else ''}"
 
 
-def located(picture: Picture, train: str) -> Located | None:
+def estimate_of(state: LiveState, train: str) -> LocalizerEstimate | None:
     """Newest answer of the localizer of a train, None if there is none."""
-    table = picture.tables.get(LOCALIZER_STATE.name(train=train))
+    table = state.tables.get(LOCALIZER_STATE.name(train=train))
     if table is None or not table.rows or table.columns != LOCALIZER_STATE.columns:
         return None
-    row = table.row(table.rows[0])
+    return read_estimate(table.row(table.rows[0]), table.stamp_ns, state.first_track(train))
+
+
+def read_estimate(row: Mapping[str, float], stamp_ns: int, track: str) -> LocalizerEstimate:
+    """View of a row of its table."""
     status = min(max(int(row["status"]), 0), 2)
     reason, left_out = _words(int(row["reason"]), int(row["excluded"]))
-    return Located(
-        table.stamp_ns,
-        picture.first_track(train),
+    return LocalizerEstimate(
+        stamp_ns,
+        track,
         row["front_m"],
         row["low_m"],
         row["high_m"],
@@ -86,43 +88,16 @@ def located(picture: Picture, train: str) -> Located | None:
     )
 
 
-def off_the_truth(picture: Picture, train: str) -> tuple[float, float, float] | None:
+def error_of(state: LiveState, train: str) -> tuple[float, float, float] | None:
     """Position, low and high end of the localizer, less the truth of its own tick [m]."""
-    said = located(picture, train)
-    if said is None or not said.known:
+    estimate = estimate_of(state, train)
+    if estimate is None or not estimate.known:
         return None
-    error_m = picture.error_m(train, said.track, said.front_m, said.stamp_ns)
+    error_m = state.error_m(train, estimate.track, estimate.front_m, estimate.stamp_ns)
     if error_m is None:
         return None
-    true_m = said.front_m - error_m
-    return error_m, said.low_m - true_m, said.high_m - true_m
-
-
-def shown(picture: Picture, train: str, *, gone: bool) -> dict[str, Any] | None:
-    """The same for the page."""
-    said = located(picture, train)
-    if said is None:
-        return None
-    age_s = max(0.0, (picture.now_ns - said.stamp_ns) * 1e-9)
-    made: dict[str, Any] = {
-        "status": said.status,
-        "reason": said.reason,
-        "left_out": said.left_out,
-        "track": said.track,
-        "age_s": round(age_s, 2),
-        "gone": gone,
-    }
-    if said.known:
-        off = off_the_truth(picture, train)
-        made |= {
-            "at_m": round(said.front_m, 3),
-            "low_m": round(said.low_m, 3),
-            "high_m": round(said.high_m, 3),
-            "protection_m": round(said.protection_m, 3),
-            "error_m": None if off is None else round(off[0], 3),
-            "holds": None if off is None else off[1] <= 0.0 <= off[2],
-        }
-    return made
+    true_m = estimate.front_m - error_m
+    return error_m, estimate.low_m - true_m, estimate.high_m - true_m
 
 
 def _words(reason: int, excluded: int) -> tuple[str, tuple[str, ...]]:

@@ -26,7 +26,7 @@ def decode(topic: str, message: Any) -> str:
             view = kind.view.from_msg(message)
         except ValueError as error:
             return f"({error})\n{raw_text(message)}"
-        return str(_VIEWS[kind.view](view))
+        return str(_VIEWS.get(kind.view, str)(view))
     if hasattr(message, "status") and isinstance(message.status, list):
         return "\n".join(_status(status) for status in message.status)
     if hasattr(message, "level") and hasattr(message, "hardware_id"):

@@ -55,15 +55,15 @@ def subsystems() -> tuple[Subsystem, ...]:
 
 
 def _refuse_twins(found: list[Subsystem], extra: Subsystem, where: str) -> None:
-    taken = [("the corridor", _OWN), *((other.name, _names_of(other)) for other in found)]
-    mine = _names_of(extra)
+    taken = [("the corridor", _OWN), *((other.name, names_of(other)) for other in found)]
+    mine = names_of(extra)
     for owner, names in taken:
         for what in mine:
             for twin in sorted(mine[what] & names[what]):
                 raise InputError(f"{what} {twin} belongs to {owner}", field=GROUP, value=where)
 
 
-def _names_of(subsystem: Subsystem) -> dict[str, set[str]]:
+def names_of(subsystem: Subsystem) -> dict[str, set[str]]:
     """Every name that a subsystem takes, by what it names."""
     return {
         "name": {subsystem.name},

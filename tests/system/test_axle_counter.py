@@ -6,6 +6,7 @@ path of Python has the equipment, everybody else has not.
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -64,7 +65,7 @@ def test_it_is_checked_run_and_reported(with_it: Rail) -> None:
     check = with_it.start("check", "counted_line")
     assert with_it.finish(check) == 0, with_it.errors(check)
     assert "section acs1: main 200..650 m, between dp1, dp2" in with_it.output(check)
-    report = with_it.recorded("counted_line", "--processes", "one")
+    report = with_it.report("counted_line", "--processes", "one")
     counted = report["axle_counter"]
     assert counted["axles"] == counted["counted"] == 3 * 24
     for name in ("miscounts", "unclear", "free_while_occupied_ticks", "not_known_ticks"):
@@ -84,7 +85,7 @@ def test_a_miscount_and_a_dead_point_are_in_the_report(with_it: Rail, installed:
     fault = "faults:\n  - {kind: missed_axles, point: dp1, every: 3}\n"
     path = with_it.directory / "loose_head.yaml"
     path.write_text(shipped(installed) + fault)
-    report = with_it.report(path, "--kill", "/wayside/dp3/wheel_sensor@20", "--processes", "one")
+    report = with_it.report(path, "--kill", "/wayside/dp3/wheel_sensor@20", "--timeout", 5)
     points, sections = (report["axle_counter"][name] for name in ("points", "sections"))
     assert points["dp1"]["miscounts"] == 8
     assert points["dp2"]["miscounts"] == 0
@@ -93,6 +94,24 @@ def test_a_miscount_and_a_dead_point_are_in_the_report(with_it: Rail, installed:
     assert sections["acs2"]["free_while_occupied_ticks"] == 0
     assert sections["acs2"]["not_known_ticks"] == pytest.approx(400, abs=2)
     assert [failed["node"] for failed in report["failures"]] == ["/wayside/dp3/wheel_sensor"]
+
+
+def test_a_recording_is_reported_where_it_is_installed_and_refused_elsewhere(
+    with_it: Rail, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short = ("counted_line", "--processes", "one", "--duration", 15)
+    report = with_it.report(*short, "--record", with_it.directory / "run.mcap")
+    again = with_it.start("report", "run.mcap", "--json", "again.json")
+    assert with_it.finish(again) == 0, with_it.errors(again)
+    assert "not what the run itself reported" not in with_it.output(again)
+    assert json.loads((with_it.directory / "again.json").read_text()) == report
+    assert report["axle_counter"]["counted"] == 24
+    monkeypatch.setenv("PYTHONPATH", "")
+    refused = with_it.start("report", "run.mcap")
+    assert with_it.finish(refused) == 2
+    assert "axle_counters" in with_it.errors(refused)
+    assert "there is no such field" in with_it.errors(refused)
+    assert with_it.errors(refused).count("\n") == 1
 
 
 def test_a_wrong_field_of_its_section_is_one_line(with_it: Rail, installed: Path) -> None:
@@ -117,6 +136,7 @@ def test_its_contracts_are_kept(with_it: Rail) -> None:
     lint = [str(Path(sys.executable).with_name("lint-imports")), "--no-cache"]
     run = with_it.start(command=[*lint, "--config", str(EXAMPLE / "pyproject.toml")])
     assert with_it.finish(run) == 0, with_it.output(run) + with_it.errors(run)
+    assert "3 kept, 0 broken" in with_it.output(run)
 
 
 def test_its_topics_are_in_the_reference_where_it_is_installed(with_it: Rail) -> None:

@@ -232,6 +232,11 @@ def run_checks(pytest_arguments: list[str]) -> int:
         "ruff check": [str(VENV / "bin" / "ruff"), "check", "."],
         "imports": [str(VENV / "bin" / "lint-imports"), "--no-cache"],
         "mypy": [python, "-m", "mypy"],
+        # Examples that are distributions of their own have settings of their own.
+        **{
+            f"mypy {path.parent.name}": [python, "-m", "mypy", "--config-file", str(path)]
+            for path in sorted((ROOT / "examples").glob("*/pyproject.toml"))
+        },
         "documents": [python, str(ROOT / "docs" / "refresh.py"), "--check"],
         # Faults put into copies of the sources, each of which a test must notice.
         "mutants": [python, str(ROOT / "tests" / "mutants.py")],

@@ -63,7 +63,7 @@ def module_domain() -> Iterator[int]:
 _ONLY_RUN = {
     "test_positions_on_board",
     *("test_kill_campaign", "test_track_codes", "test_train_radio", "test_placement"),
-    *("test_hostile_network", "test_train_bus"),
+    *("test_hostile_network", "test_train_bus", "test_axle_counter"),
 }
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = sorted((ROOT / "src").glob("*/*/**/*.py"))
+MODULES = sorted([*ROOT.glob("src/*/*/**/*.py"), *ROOT.glob("examples/*/src/**/*.py")])
 MOST_LINES = 400
 
 
 def ids(path: Path) -> str:
     """Return a short name for a module."""
-    return str(path.relative_to(ROOT / "src"))
+    return str(path.relative_to(ROOT)).removeprefix("src/")
 
 
 @pytest.mark.parametrize("path", MODULES, ids=ids)

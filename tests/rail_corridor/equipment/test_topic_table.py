@@ -18,6 +18,7 @@ from rclpy.qos import (
 )
 
 import rail_msgs_py.topics
+from rail_corridor.cli.topic_docs import ends_of
 from rail_corridor.equipment.registry import kind_of, topics
 from rail_msgs_py.topics.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
 from rail_msgs_py.topics.ranging import RANGE
@@ -81,7 +82,7 @@ def test_every_name_tells_its_kind_and_no_other(topic: Topic) -> None:
 
 @pytest.mark.parametrize("topic", topics(), ids=lambda t: t.pattern)
 def test_every_topic_is_documented(topic: Topic) -> None:
-    for text in (topic.sender, topic.readers, topic.text):
+    for text in (*ends_of(topic), topic.text):
         assert text.strip()
     assert topic.text.endswith(".")
     assert name_of(topic.qos) in ("stream", "estimate", "latched")

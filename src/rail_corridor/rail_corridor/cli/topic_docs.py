@@ -60,7 +60,8 @@ def parameters_of(kind: str) -> Any:
 def ends_of(topic: Topic) -> tuple[str, str]:
     """Who sends a topic, and who reads it.
 
-    Of the topics of the tick itself, those kinds of nodes whose part in it says so.
+    Of the topics of the tick itself, those kinds of nodes whose part in it says so; of the others
+    also those that say it by themselves, see `NodeKind.reads`.
     """
     kinds = node_kinds().values()
     waiting = ", ".join(kind.name for kind in kinds if kind.waits)
@@ -70,7 +71,8 @@ def ends_of(topic: Topic) -> tuple[str, str]:
         return ", ".join(kind.name for kind in kinds if kind.sink), topic.readers
     if topic is FAILED:
         return f"{topic.sender}: {waiting}", f"{waiting}, the report"
-    return topic.sender, topic.readers
+    readers = [kind.name for kind in kinds if any(topic is each for each in kind.reads)]
+    return topic.sender, ", ".join(filter(None, (*readers, topic.readers)))
 
 
 def topic_table() -> str:

@@ -6,6 +6,8 @@ import importlib
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from rail_msgs_py.topics.topic import Topic
+
 Side = Literal["world", "wayside", "onboard"]
 
 
@@ -25,6 +27,8 @@ class NodeKind:
         Whether the tick ends only when it is done.
     waits : bool
         Whether it waits for others, so that it names on ``/failed`` who is missing.
+    reads : tuple of Topic
+        What it reads of the topics of the world, which know none of their readers by name.
     """
 
     name: str
@@ -32,6 +36,7 @@ class NodeKind:
     clocked: bool = False
     sink: bool = False
     waits: bool = False
+    reads: tuple[Topic, ...] = ()
 
     def load(self) -> Any:
         """Its class."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib.metadata import entry_points
-from typing import Final
+from typing import Final, get_args
 
 from rail_corridor.equipment.doppler.subsystem import DOPPLER
 from rail_corridor.equipment.localizer.subsystem import LOCALIZER
@@ -17,6 +17,7 @@ from rail_corridor.equipment.track_code.subsystem import TRACK_CODE
 from rail_corridor.equipment.train_bus.subsystem import TRAIN_BUS
 from rail_corridor.equipment.train_radio.subsystem import TRAIN_RADIO
 from rail_corridor.errors import InputError
+from rail_corridor.scenario.faults import Fault, TrainStop, WheelSlip
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import tick, world
 from rail_msgs_py.topics.topic import Topic
@@ -55,15 +56,39 @@ def subsystems() -> tuple[Subsystem, ...]:
 
 
 def _refuse_twins(found: list[Subsystem], extra: Subsystem, where: str) -> None:
-    for other in found:
-        for what, mine, theirs in (
-            ("name", {extra.name}, {other.name}),
-            ("section", {s.name for s in extra.sections}, {s.name for s in other.sections}),
-            ("kind of node", {n.name for n in extra.nodes}, {n.name for n in other.nodes}),
-            ("topic", {t.pattern for t in extra.topics}, {t.pattern for t in other.topics}),
-        ):
-            for twin in sorted(mine & theirs):
-                raise InputError(f"{what} {twin} belongs to {other.name}", field=GROUP, value=where)
+    taken = [("the corridor", _OWN), *((other.name, names_of(other)) for other in found)]
+    mine = names_of(extra)
+    for owner, names in taken:
+        for what in mine:
+            for twin in sorted(mine[what] & names[what]):
+                raise InputError(f"{what} {twin} belongs to {owner}", field=GROUP, value=where)
+
+
+def names_of(subsystem: Subsystem) -> dict[str, set[str]]:
+    """Every name that a subsystem takes, by what it names."""
+    return {
+        "name": {subsystem.name},
+        "section": {section.name for section in subsystem.sections},
+        "kind of fault": {_kind_of_fault(fault) for fault in subsystem.faults},
+        "option": {option.option for option in subsystem.options},
+        "kind of node": {kind.name for kind in subsystem.nodes},
+        "topic": {topic.pattern for topic in subsystem.topics},
+    }
+
+
+def _kind_of_fault(fault: type[Fault]) -> str:
+    return str(get_args(fault.model_fields["kind"].annotation)[0])
+
+
+#: Names that are the corridor's own.
+_OWN: Final[dict[str, set[str]]] = {
+    "name": set(),
+    "section": set(Scenario.model_fields),
+    "kind of fault": {_kind_of_fault(fault) for fault in (TrainStop, WheelSlip)},
+    "option": set(),
+    "kind of node": {WORLD.name},
+    "topic": {topic.pattern for topic in (*tick.TOPICS, *world.TOPICS)},
+}
 
 
 @lru_cache(maxsize=1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 from rich.console import RenderableType
@@ -108,6 +109,8 @@ class Subsystem:
     options: ClassVar[tuple[SectionOption, ...]] = ()
     nodes: ClassVar[tuple[NodeKind, ...]] = ()
     topics: ClassVar[tuple[Topic, ...]] = ()
+    #: Folder of scenarios that come with it, which then run by their names; None if none do.
+    scenarios: ClassVar[Path | None] = None
 
     def present(self, scenario: Scenario) -> bool:
         """Whether a scenario has it."""

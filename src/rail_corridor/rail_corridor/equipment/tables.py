@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 
 #: Columns of words rather than of numbers.
-_WORDS = ("train", "by", "fault")
+_WORDS = ("train", "by", "fault", "point", "section")
 
 
 def new_table(title: str, *headings: str) -> Table:

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from rail_corridor.equipment.registry import subsystems
 from rail_corridor.errors import InputError, from_validation
 from rail_corridor.scenario.model import Scenario
 from rail_corridor.yaml_file import load_yaml
@@ -21,8 +22,22 @@ _SCENARIOS: Final = Path(str(resources.files("rail_corridor.loading"))) / "built
 
 
 def builtin_scenarios() -> dict[str, Path]:
-    """Return the scenarios that come with the package, name to file."""
-    return {path.stem: path for path in sorted(_SCENARIOS.glob("*.yaml"))}
+    """Return the scenarios that come with the corridor and with equipment, name to file.
+
+    Raises
+    ------
+    InputError
+        If two have one name.
+    """
+    folders = (_SCENARIOS, *(each.scenarios for each in subsystems() if each.scenarios))
+    found: dict[str, Path] = {}
+    for folder in folders:
+        for path in sorted(folder.glob("*.yaml")):
+            if path.stem in found:
+                reason = f"there is one of this name already, {found[path.stem]}"
+                raise InputError(reason, file=str(path))
+            found[path.stem] = path
+    return found
 
 
 def load_scenario(name_or_path: str | Path, *, overrides: Overrides | None = None) -> Scenario:

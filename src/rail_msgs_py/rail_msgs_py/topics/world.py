@@ -20,7 +20,7 @@ STATE: Final = Topic(
     ESTIMATE,
     Table,
     "world",
-    "radio_medium, rail_medium, cbtc_medium, reference_medium, the report",
+    "the report",
     "The truth of the tick, one row per train: where its antenna is, how it moves. "
     "Equipment does not read it.",
     columns=(
@@ -82,7 +82,7 @@ ODOMETER: Final = Topic(
     STREAM,
     Table,
     "world",
-    "code_supervision, atp, localizer",
+    "",
     "What the wheels of a train count: distance and speed, with the error of their diameter.",
     columns=("distance_m", "speed_mps"),
 )

@@ -16,6 +16,7 @@ from rail_corridor.run_data import RecordSpec, RunData, per_train
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import doppler as topics
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
+from rail_msgs_py.topics.world import STATE
 from rail_world.line.description_base import Description
 
 from .checks import check_doppler
@@ -41,6 +42,7 @@ class Doppler(Subsystem):
             "rail_world.doppler.medium_node:ReferenceMediumNode",
             sink=True,
             waits=True,
+            reads=(STATE,),
         ),
         NodeKind(
             "reference_station",

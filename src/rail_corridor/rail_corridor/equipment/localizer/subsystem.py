@@ -18,6 +18,7 @@ from rail_corridor.run_data import RecordSpec, RunData, per_train
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import localizer as topics
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
+from rail_msgs_py.topics.world import ODOMETER
 
 from .nodes import localizer_nodes
 from .report import localizer_metrics
@@ -33,7 +34,12 @@ class Localizer(Subsystem):
     name = "localizer"
     sections = (LOCALIZER_SECTION,)
     nodes = (
-        NodeKind("localizer", "rail_onboard.localizer.localizer_node:LocalizerNode", waits=True),
+        NodeKind(
+            "localizer",
+            "rail_onboard.localizer.localizer_node:LocalizerNode",
+            waits=True,
+            reads=(ODOMETER,),
+        ),
     )
     topics = topics.TOPICS
 

@@ -18,6 +18,7 @@ from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.position import figures_from_cdr as position_from_cdr
 from rail_msgs_py.topics import ranging as topics
 from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
+from rail_msgs_py.topics.world import STATE
 from rail_signals.arrays import FloatArray
 from rail_world.line.description_base import Description
 from rail_world.line.drawing import Drawing
@@ -41,7 +42,11 @@ class Ranging(Subsystem):
     options = (SectionOption("--zone-length", "stations", "zone_length_m", ("positions",)),)
     nodes = (
         NodeKind(
-            "radio_medium", "rail_world.ranging.medium_node:RadioMediumNode", sink=True, waits=True
+            "radio_medium",
+            "rail_world.ranging.medium_node:RadioMediumNode",
+            sink=True,
+            waits=True,
+            reads=(STATE,),
         ),
         NodeKind("wrs", "rail_wayside.ranging.wrs_node:WrsNode", clocked=True),
         NodeKind(

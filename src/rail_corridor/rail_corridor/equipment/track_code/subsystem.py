@@ -14,7 +14,7 @@ from rail_corridor.run_data import RecordSpec, RunData, per_train
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import track_code as topics
 from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT
-from rail_msgs_py.topics.world import COMMAND
+from rail_msgs_py.topics.world import COMMAND, ODOMETER, STATE
 from rail_world.line.description_base import Description
 
 from .checks import check_codes
@@ -35,7 +35,11 @@ class TrackCode(Subsystem):
     faults = (Sanding, DeadTransmitter)
     nodes = (
         NodeKind(
-            "rail_medium", "rail_world.track_code.medium_node:RailMediumNode", sink=True, waits=True
+            "rail_medium",
+            "rail_world.track_code.medium_node:RailMediumNode",
+            sink=True,
+            waits=True,
+            reads=(STATE,),
         ),
         NodeKind(
             "track_code_transmitter",
@@ -51,6 +55,7 @@ class TrackCode(Subsystem):
             _SUPERVISION,
             "rail_onboard.track_code.supervision_node:CodeSupervisionNode",
             waits=True,
+            reads=(ODOMETER,),
         ),
     )
     topics = topics.TOPICS

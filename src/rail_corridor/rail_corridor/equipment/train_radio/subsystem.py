@@ -22,7 +22,7 @@ from rail_msgs_py.topics.train_radio import (
     REPORTS,
     STRIKES,
 )
-from rail_msgs_py.topics.world import COMMAND
+from rail_msgs_py.topics.world import COMMAND, ODOMETER, STATE
 from rail_world.line.description_base import Description
 
 from .checks import check_cbtc
@@ -43,7 +43,13 @@ class TrainRadio(Subsystem):
     sections = (CBTC,)
     faults = (DeadBaseStation, NetworkThreats)
     nodes = (
-        NodeKind("cbtc_medium", f"{_MEDIUM}.medium_node:CbtcMediumNode", sink=True, waits=True),
+        NodeKind(
+            "cbtc_medium",
+            f"{_MEDIUM}.medium_node:CbtcMediumNode",
+            sink=True,
+            waits=True,
+            reads=(STATE,),
+        ),
         NodeKind(
             "backbone", f"{_MEDIUM}.backbone_node:BackboneNode", clocked=True, sink=True, waits=True
         ),
@@ -59,7 +65,12 @@ class TrainRadio(Subsystem):
             clocked=True,
             waits=True,
         ),
-        NodeKind("atp", "rail_onboard.train_radio.atp_node:AtpNode", waits=True),
+        NodeKind(
+            "atp",
+            "rail_onboard.train_radio.atp_node:AtpNode",
+            waits=True,
+            reads=(ODOMETER,),
+        ),
     )
     topics = topics.TOPICS
 

@@ -1,0 +1,1 @@
+"""Axle counters: wheel sensors at block borders, and what counts between them."""

@@ -1,0 +1,1 @@
+"""What the corridor asks: section, faults, placement, nodes, report."""

@@ -1,0 +1,1 @@
+"""Wheel sensors, axles and counts as pure functions and classes; no ROS."""

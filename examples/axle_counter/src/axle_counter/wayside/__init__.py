@@ -1,0 +1,1 @@
+"""The equipment: detection points and the evaluator."""

@@ -1,0 +1,1 @@
+"""The truth: how axles damp the coils."""

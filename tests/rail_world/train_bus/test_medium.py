@@ -148,7 +148,7 @@ def test_the_reflectometer_sees_what_the_model_of_the_cable_says(ohm: float) -> 
     edge = np.tile(step_edge(told.time_s, instrument.rise_time_s), (2, 1))
     seen = here.reflect(400, 100.0, edge, 1.0 / instrument.sample_period_s)
     assert np.abs(seen[0] - told.reflection[0]).max() < 3e-6
-    assert np.array_equal(seen[0], seen[1])
+    assert np.abs(seen[0] - seen[1]).max() < 1e-10  # the least noise that there may be
 
 
 def test_a_hard_edge_rings_but_does_not_fold_back() -> None:

@@ -16,6 +16,7 @@ from rail_corridor.loading.overrides import Overrides
 from rail_corridor.plan.plan import make_plan
 from rail_corridor.report.observer import Observer
 from rail_corridor.run.host import make_node
+from rail_msgs_py.quantity import quantity_of
 from rail_msgs_py.topics import doppler, localizer, track_code, train_bus, train_radio
 from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.train_radio import BACKBONE_DOWN, BACKBONE_UP, STRIKES
@@ -111,7 +112,7 @@ def test_every_declared_parameter_is_documented(graph: Any, tmp_path: Path, scen
             assert declared - ros_own == set(fields)
             for name, field in fields.items():
                 described = node.describe_parameter(name)
-                assert described.description.startswith(field.metadata["text"])
+                assert described.description == quantity_of(field).description
                 assert described.read_only
 
 
@@ -143,8 +144,8 @@ def test_the_document_is_written_or_printed(
 def test_every_field_of_every_node_is_described() -> None:
     for kind in node_kinds():
         for field in dataclasses.fields(parameters_of(kind)):
-            assert field.metadata["text"].strip()
+            assert quantity_of(field).text.strip()
             suffix = field.name.rpartition("_")[2]
             units = {"s": "s", "hz": "Hz", "m": "m", "dbm": "dBm"}
             if suffix in units:
-                assert field.metadata["unit"] == units[suffix], field.name
+                assert quantity_of(field).unit == units[suffix], field.name

@@ -82,7 +82,8 @@ class Terminal:
         self.link = graph.mailbox(BUS_LINK, train="train_1", end=end)
         self._clock = graph.sender(CLOCK)
         self._rx = graph.sender(BUS_RX, train="train_1", end=end)
-        node = BusTerminalNode(f"bus_{end}", context=graph.context, parameters={"end": end})
+        given = {"end": end, "tick_s": 1e-9 * TICK_NS}
+        node = BusTerminalNode(f"bus_{end}", context=graph.context, parameters=given)
         node.switch_on()
         graph.add(node)
         graph.connect(self.name)
@@ -220,7 +221,7 @@ class Monitor:
         self._rng = rng = np.random.default_rng(5)
         self._line = self.consist.line(Deviations.draw(len(CARS), rng))
         self._rough = draw_roughness(self.consist, rng)
-        given = {"cars": CARS, "period_s": 1.0, "traces": 4, **given}
+        given = {"cars": CARS, "tick_s": 1e-9 * TICK_NS, "period_s": 1.0, "traces": 4, **given}
         node = TrainBusMonitorNode(context=graph.context, parameters=given)
         node.switch_on()
         graph.add(node)

@@ -1,7 +1,7 @@
 """Node parameters as frozen dataclasses: described, bounded, declared once.
 
-A node's parameters are the fields of one dataclass, made with :func:`parameter`. The same
-fields declare the ROS parameters, validate their values and fill ``docs/topics.md``.
+A node's parameters are the fields of one dataclass, each of a `Quantity`. The same fields declare
+the ROS parameters, validate their values and fill ``docs/topics.md``.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from typing import Any, TypeVar, get_type_hints
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.parameter import Parameter
+
+from .quantity import Quantity, quantity_of
 
 Parameters = TypeVar("Parameters")
 
@@ -30,7 +32,10 @@ class ParameterError(ValueError):
 def parameter(
     default: Any, text: str, *, unit: str = "", low: float = -math.inf, high: float = math.inf
 ) -> Any:
-    """Field of a parameter dataclass.
+    """Field of a parameter dataclass for what only this node knows.
+
+    What a scenario sets is a `Quantity` that the section refers to as well; its field is
+    `Quantity.parameter`.
 
     Parameters
     ----------
@@ -41,9 +46,7 @@ def parameter(
     low, high : float
         Inclusive bounds of a number, and of each number of an array.
     """
-    return dataclasses.field(
-        default=default, metadata={"text": text, "unit": unit, "low": low, "high": high}
-    )
+    return Quantity(default, text, unit, low, high).parameter()
 
 
 def declare(node: Any, kind: type[Parameters]) -> Parameters:
@@ -72,26 +75,21 @@ def _declare_field(node: Any, field: dataclasses.Field[Any], hint: Any) -> Any:
     if hint in _ARRAYS:
         value = node.declare_parameter(field.name, _ARRAYS[hint], described).value
         # An array parameter that nobody sets has no value: there is no typed empty default.
-        value = numbers = tuple(default if value is None else value)
+        value = tuple(default if value is None else value)
     else:
         value = node.declare_parameter(field.name, hint(default), described).value
-        numbers = (value,)
-    for number in numbers:
-        if isinstance(number, bool) or not isinstance(number, (int, float)):
-            continue
-        low, high = field.metadata["low"], field.metadata["high"]
-        if math.isnan(number) or not low <= number <= high:
-            raise ValueError(f"{number} is not within [{low}, {high}] {field.metadata['unit']}")
+    if refused := quantity_of(field).refusal(value):
+        raise ValueError(refused)
     return value
 
 
 def descriptor(field: dataclasses.Field[Any], hint: Any) -> ParameterDescriptor:
     """ROS descriptor of a field: text with unit, bounds, read-only once the node is up."""
-    unit = field.metadata["unit"]
-    described = ParameterDescriptor(
-        description=field.metadata["text"] + (f" [{unit}]" if unit else ""), read_only=True
-    )
-    low, high = field.metadata["low"], field.metadata["high"]
+    quantity = quantity_of(field)
+    described = ParameterDescriptor(description=quantity.description, read_only=True)
+    if quantity.choices:
+        described.additional_constraints = f"one of {', '.join(map(str, quantity.choices))}"
+    low, high = quantity.low, quantity.high
     if hint is float and math.isfinite(low) and math.isfinite(high):
         described.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
     elif hint is int and math.isfinite(low) and math.isfinite(high):

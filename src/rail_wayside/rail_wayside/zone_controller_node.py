@@ -23,6 +23,7 @@ from rail_msgs_py.decoders import stamped
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.position import Position, PositionWriter
+from rail_msgs_py.quantities import GIVE_UP
 from rail_msgs_py.ranging.range_reading import range_from_cdr
 from rail_msgs_py.table import TableWriter
 from rail_msgs_py.tick_node import TickNode
@@ -64,9 +65,7 @@ class ZoneControllerParameters(AuthorityParameters):
     )
     trains: tuple[str, ...] = parameter((), "trains, in the order they enter the line")
     entry_zones: tuple[str, ...] = parameter((), "zone where each train is first seen")
-    timeout_s: float = parameter(
-        3.0, "wall time after which a reading is given up", unit="s", low=0.05, high=3600.0
-    )
+    timeout_s: float = GIVE_UP.but(default=3.0).parameter()
 
 
 def zone_map_of(p: ZoneControllerParameters) -> ZoneMap:

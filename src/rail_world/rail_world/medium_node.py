@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from rail_msgs_py.decoders import table
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.quantities import GIVE_UP
 from rail_msgs_py.tick_inputs import TickInputs
 from rail_msgs_py.tick_node import TickNode
 from rail_msgs_py.topics.tick import DONE
@@ -22,9 +23,7 @@ class MediumParameters:
     """Parameters of every medium."""
 
     world_file: str = parameter("", "JSON file with tracks, trains and media")
-    timeout_s: float = parameter(
-        2.0, "wall time after which a block is given up", unit="s", low=0.05, high=3600.0
-    )
+    timeout_s: float = GIVE_UP.parameter()
 
 
 Parameters = TypeVar("Parameters", bound=MediumParameters)

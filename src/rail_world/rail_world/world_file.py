@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from rail_msgs_py.quantities import ODOMETER_ERROR, SEED, TICK
 from rail_world.line.description import JunctionDescription, TrackDescription
+from rail_world.line.description_base import range_of
 from rail_world.line.drawing import Drawing
 from rail_world.line.network import Network, build_network
 from rail_world.trains.description import TrainDescription, TrainStop, WheelSlip
@@ -23,8 +25,8 @@ class WorldFile(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    seed: int = Field(ge=0)
-    tick_s: float = Field(gt=0.0)
+    seed: Annotated[int, range_of(SEED)]
+    tick_s: Annotated[float, range_of(TICK)]
     tracks: dict[str, TrackDescription]
     junctions: tuple[JunctionDescription, ...] = ()
     trains: tuple[TrainDescription, ...]
@@ -35,9 +37,7 @@ class WorldFile(BaseModel):
     stops: tuple[TrainStop, ...] = ()
     slips: tuple[WheelSlip, ...] = ()
     scenario: str = Field("", description="JSON, announced as it is on /world/scenario")
-    odometer_error: float = Field(
-        0.005, ge=0.0, le=0.1, description="standard deviation of the wheels' relative error"
-    )
+    odometer_error: Annotated[float, range_of(ODOMETER_ERROR)]
 
     @property
     def tick_ns(self) -> int:

@@ -21,6 +21,7 @@ from rail_msgs_py.failures import WATCH_PERIOD_S, FailureWatch
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
+from rail_msgs_py.quantities import CAB_SIGNALS, GIVE_UP
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
 from rail_msgs_py.table import figures_from_cdr
 from rail_msgs_py.tap import raw_publish
@@ -64,13 +65,9 @@ class WorldParameters:
     supervision: str = parameter(
         "code_supervision", "name of the node on each of them that commands it"
     )
-    cab_signals: bool = parameter(
-        True, "whether drivers keep to the permitted speed before the brake makes them"
-    )
+    cab_signals: bool = CAB_SIGNALS.parameter()
     observed: bool = parameter(False, "whether to stay within reach of the report")
-    timeout_s: float = parameter(
-        5.0, "wall time after which a sink is given up", unit="s", low=0.1, high=3600.0
-    )
+    timeout_s: float = GIVE_UP.but(default=5.0).parameter()
     start_timeout_s: float = parameter(
         60.0, "wall time to wait for the nodes at the start", unit="s", low=0.1, high=3600.0
     )

@@ -22,6 +22,7 @@ NETWORK = build_network(
     },
     (),
 )
+ALWAYS = {"from_s": 0.0, "to_s": 1e6}
 STATIONS = ((1000.0, 20.0, 6.0), (1600.0, -20.0, 6.0))
 
 
@@ -30,7 +31,14 @@ def medium(*faults: ReferenceFault, **changes: object) -> ReferenceMedium:
         ReferenceStation(name=f"ref{n}", track="straight", chainage_m=place[0], position_m=place)
         for n, place in enumerate(STATIONS, start=1)
     )
-    fields: dict[str, object] = {"receiver_ppm": 0.0, "station_ppb": 0.0, "noise_figure_db": 0.0}
+    fields: dict[str, object] = {
+        "receiver_ppm": 0.0,
+        "station_ppb": 0.0,
+        "noise_figure_db": 0.0,
+        "path_loss_exponent": 2.0,
+        "extra_loss_db": 0.0,
+        "reach_m": 2000.0,
+    }
     description = ReferenceDescription(
         stations=stations,
         trains=("a",),
@@ -131,7 +139,7 @@ def test_a_dead_station_is_silent_and_a_detuned_one_is_off_while_it_lasts() -> N
     only = {0: tones()[0]}
     assert medium(dead).receive(10, 1.0, still, only) == {}
     assert 0 in medium(dead).receive(20, 2.0, still, only)
-    detuned = ReferenceFault(kind="detuned_reference", station="ref1", shift_hz=100.0)
+    detuned = ReferenceFault(kind="detuned_reference", station="ref1", **ALWAYS, shift_hz=100.0)
     heard = medium(detuned).receive(0, 0.0, still, {0: 1e6 * only[0]})[0]
     turn = np.angle(np.vdot(heard[:-1], heard[1:])) * PLAN.sample_rate_hz / (2.0 * np.pi)
     assert turn == pytest.approx(PLAN.slot_offset_hz(2) + 100.0, abs=0.5)
@@ -151,4 +159,4 @@ def test_a_block_of_another_length_is_refused() -> None:
 
 def test_a_fault_of_no_station_is_refused() -> None:
     with pytest.raises(ValueError, match="no reference station ref9"):
-        medium(ReferenceFault(kind="dead_reference", station="ref9"))
+        medium(ReferenceFault(kind="dead_reference", station="ref9", **ALWAYS))

@@ -44,6 +44,11 @@ def antenna(
     )
 
 
+def pattern(**more: float) -> AntennaPattern:
+    settings = {"gain_dbi": 6.0, "beamwidth_deg": 60.0, "front_to_back_db": 30.0}
+    return AntennaPattern(**settings | more)
+
+
 def medium(*stations: StationAntenna, trains: int = 1, seed: int = 1, **more: Any) -> RadioMedium:
     return RadioMedium(description(*stations, trains=trains, **more), seed)
 
@@ -55,6 +60,10 @@ def description(*stations: StationAntenna, trains: int = 1, **more: Any) -> Radi
         "carriers_hz": {1: DOWN_HZ, 2: UP_HZ, 3: 2.41e9, 4: 2.415e9},
         "stations": stations or (antenna(),),
         "trains": tuple(f"train_{n}" for n in range(trains)),
+        "station_pattern": pattern(gain_dbi=12.0),
+        "train_pattern": pattern(),
+        "path_loss_exponent": 2.0,
+        "noise_figure_db": 8.0,
         "oscillator_ppm": 0.0,
         **more,
     }
@@ -125,13 +134,12 @@ def test_the_link_is_reciprocal_but_for_the_carrier() -> None:
 
 @pytest.mark.parametrize("beamwidth_deg", [20.0, 60.0, 90.0])
 def test_half_the_power_at_half_the_beamwidth(beamwidth_deg: float) -> None:
-    pattern = AntennaPattern(beamwidth_deg=beamwidth_deg)
     half_rad = math.radians(beamwidth_deg / 2.0)
     radio = medium(
         antenna(),
         antenna(towards=(math.cos(half_rad), math.sin(half_rad), 0.0), site="wrs2"),
         antenna(towards=(math.cos(half_rad), 0.0, -math.sin(half_rad)), site="wrs3"),
-        station_pattern=pattern,
+        station_pattern=pattern(beamwidth_deg=beamwidth_deg),
     )
     gain_db = radio.paths(at((500.0, 0.0))).gain_db[:, 0]
     assert gain_db[0] - gain_db[1:] == pytest.approx([3.0, 3.0], abs=1e-9)
@@ -139,10 +147,8 @@ def test_half_the_power_at_half_the_beamwidth(beamwidth_deg: float) -> None:
 
 @pytest.mark.parametrize("front_to_back_db", [0.0, 10.0, 30.0])
 def test_front_to_back_ratio(front_to_back_db: float) -> None:
-    pattern = {"front_to_back_db": front_to_back_db}
-    radio = medium(
-        station_pattern=AntennaPattern(**pattern), train_pattern=AntennaPattern(**pattern)
-    )
+    both = pattern(front_to_back_db=front_to_back_db)
+    radio = medium(station_pattern=both, train_pattern=both)
     ahead, behind = (radio.paths(at((x, 0.0))).gain_db[0, 0] for x in (300.0, -300.0))
     # Behind the station both antennas are turned away from each other.
     assert ahead - behind == pytest.approx(2.0 * front_to_back_db)
@@ -306,7 +312,7 @@ def test_a_dead_station_neither_sends_nor_hears() -> None:
 
 
 def test_every_antenna_of_a_dead_site_is_dead() -> None:
-    fault = Fault(kind="dead_station", station="wrs1")
+    fault = Fault(kind="dead_station", station="wrs1", from_s=0.0, to_s=1e6)
     radio = medium(
         antenna(), antenna(zone="zone2"), antenna(site="wrs2", zone="zone3"), faults=(fault,)
     )

@@ -17,6 +17,7 @@ C_MPS = 299_792_458.0
 BOLTZMANN_J_PER_K = 1.380649e-23
 SIGNAL = RangingSignal()
 BURST = modulate(SIGNAL, [0.7])
+LOBE = {"beamwidth_deg": 60.0, "front_to_back_db": 30.0}
 Heard = dict[tuple[int, int], Reception]
 
 
@@ -39,6 +40,11 @@ def medium(seed: int = 1, trains: int = 2, **more: Any) -> RadioMedium:
         "carriers_hz": {1: 2.4e9, 2: 2.405e9, 3: 2.41e9, 4: 2.415e9},
         "stations": (antenna(0.0, "a"), antenna(-400.0, "b"), antenna(0.0, "c", (3, 4))),
         "trains": tuple(f"t{n}" for n in range(trains)),
+        "station_pattern": AntennaPattern(gain_dbi=12.0, **LOBE),
+        "train_pattern": AntennaPattern(gain_dbi=6.0, **LOBE),
+        "path_loss_exponent": 2.0,
+        "noise_figure_db": 8.0,
+        "oscillator_ppm": 0.1,
         **more,
     }
     return RadioMedium(RadioDescription(**settings), seed)
@@ -193,7 +199,7 @@ def test_trains_on_one_channel_add() -> None:
 
 def jammed(**fault: Any) -> RadioMedium:
     settings = {"kind": "jam", "channel": 1, "power_dbm": 20.0, "from_s": 1.0, "to_s": 2.0}
-    isotropic = AntennaPattern(gain_dbi=0.0, front_to_back_db=0.0)
+    isotropic = AntennaPattern(gain_dbi=0.0, beamwidth_deg=60.0, front_to_back_db=0.0)
     return medium(faults=(Fault(**{**settings, **fault}),), train_pattern=isotropic)
 
 
@@ -223,7 +229,10 @@ def test_a_jammer_has_its_time_and_its_channel(tick: int, on: bool) -> None:
 def test_antennas_turned_away_suppress_a_jammer() -> None:
     ratios = []
     for x_m in (300.0, -300.0):
-        fault = Fault(kind="jam", channel=2, power_dbm=20.0, position_m=(x_m, 0.0, 0.0))
+        place_m = (x_m, 0.0, 0.0)
+        fault = Fault(
+            kind="jam", channel=2, power_dbm=20.0, from_s=0.0, to_s=1.0, position_m=place_m
+        )
         radio = medium(faults=(fault,))
         paths = radio.paths(trains_at(100.0, 150.0))
         heard = radio.uplink(0, 0.0, paths, {0: (2, BURST)})[0, 2]

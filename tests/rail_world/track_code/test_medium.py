@@ -17,6 +17,16 @@ from rail_world.track_code.noise import RealNoiseSource
 RATE_HZ, TICK_S, SAMPLES = 16_000.0, 0.1, 1600
 LENGTH_M = 500.0
 ONE = np.ones(SAMPLES)
+RAILS = {
+    "sample_rate_hz": RATE_HZ,
+    "attenuation_db_per_km": 6.0,
+    "joint_attenuation_db": 40.0,
+    "white_noise_v": 0.0,
+    "impulse_rate_per_s": 0.0,
+    "impulse_amplitude_v": 0.0,
+}
+#: Of a fault that is there for good.
+ALWAYS = {"from_s": 0.0, "to_s": 1e6}
 
 
 def circuits(count: int = 6, track: str = "main", prefix: str = "tc") -> tuple[TrackCircuit, ...]:
@@ -33,10 +43,18 @@ def medium(trains: int = 1, seed: int = 1, **more: Any) -> RailMedium:
     described: dict[str, Any] = {
         "circuits": circuits(),
         "trains": tuple(f"t{n}" for n in range(trains)),
-        "white_noise_v": 0.0,
+        **RAILS,
         **more,
     }
     return RailMedium(RailDescription(**described), seed, TICK_S)
+
+
+SANDED = RailFault(kind="sanding", train="t9", loss_db=60.0, **ALWAYS)
+
+
+def broken(circuit: str, at_m: float | None = None, **when: float) -> RailFault:
+    fields = {"kind": "broken_rail", "circuit": circuit, "at_m": at_m, "loss_db": 60.0}
+    return RailFault(**fields | ALWAYS | when)
 
 
 def at(*front_m: float, length_m: float = 100.0, on_line: bool = True) -> TrainsOnRails:
@@ -172,7 +190,7 @@ def test_faults_act_in_their_time_only() -> None:
     faults = (
         RailFault(kind="sanding", train="t0", from_s=1.0, to_s=2.0, loss_db=30.0),
         RailFault(kind="dead_transmitter", circuit="tc2", from_s=3.0, to_s=4.0),
-        RailFault(kind="broken_rail", circuit="tc2", at_m=1400.0, from_s=5.0, to_s=6.0),
+        broken("tc2", 1400.0, from_s=5.0, to_s=6.0),
     )
     rails = medium(faults=faults)
     found = {}
@@ -187,7 +205,7 @@ def test_faults_act_in_their_time_only() -> None:
 
 
 def test_past_the_break_of_a_rail_the_signal_is_back() -> None:
-    fault = RailFault(kind="broken_rail", circuit="tc2")
+    fault = broken("tc2")
     rails = medium(faults=(fault,))
     assert db(rails.propagate(0, 0.0, at(1240.0), {2: ONE}).trains[0, 0]) < -60.0
     heard = rails.propagate(5, 0.5, at(1260.0), {2: ONE})
@@ -279,8 +297,8 @@ def test_a_train_hears_the_same_whatever_the_others_do() -> None:
         ({"circuits": circuits()[::2]}, "starts at"),
         ({"circuits": circuits() + circuits()[:1]}, "twice"),
         ({"tracks": ("other",)}, "no track main"),
-        ({"faults": (RailFault(kind="sanding", train="t9"),)}, "no train t9"),
-        ({"faults": (RailFault(kind="broken_rail", circuit="tc1", at_m=5.0),)}, "not in tc1"),
+        ({"faults": (SANDED,)}, "no train t9"),
+        ({"faults": (broken("tc1", 5.0),)}, "not in tc1"),
         ({"harmonics": (Harmonic(order=160, amplitude_v=1.0),)}, "not below"),
     ],
 )
@@ -295,6 +313,6 @@ def test_wrong_blocks_and_trains_are_refused() -> None:
     with pytest.raises(ValueError, match="2 trains, not 1"):
         medium().propagate(0, 0.0, at(1300.0, 1400.0), {})
     with pytest.raises(ValueError, match="whole number"):
-        RailMedium(RailDescription(circuits=circuits()), 1, 0.10003)
+        RailMedium(RailDescription(circuits=circuits(), **RAILS), 1, 0.10003)
     with pytest.raises(ValueError, match="do not agree"):
         TrainsOnRails(np.zeros(2, dtype=np.intp), np.zeros(1), np.zeros(1), np.ones(1, dtype=bool))

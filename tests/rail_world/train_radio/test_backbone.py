@@ -37,7 +37,8 @@ def backbone(*periods: ThreatPeriod, seed: int = 1) -> Backbone:
 
 
 def period(*threats: Threat, rate: float = 1.0, **more: float) -> ThreatPeriod:
-    return ThreatPeriod(threats=threats, rate=rate, **more)
+    fields = {"from_s": 0.0, "to_s": 1e6, "longest_delay_s": 3.0, **more}
+    return ThreatPeriod(threats=threats, rate=rate, **fields)
 
 
 def traffic(net: Backbone, ticks: int) -> list[tuple[Carried, Carried]]:

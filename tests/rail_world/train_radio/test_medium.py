@@ -22,6 +22,10 @@ from rail_world.train_radio.medium import Burst, CbtcMedium, Links
 
 RATE_HZ, TICK_S, SAMPLES = 400e3, 0.1, 40_000
 DOWN_HZ, UP_HZ = {1: 2.412e9, 2: 2.422e9}, {1: 2.452e9, 2: 2.462e9}
+ALWAYS = {"from_s": 0.0, "to_s": 1e6}
+DEAD = CbtcFault(kind="dead_base_station", base_station="x", **ALWAYS)
+#: Noise out of sight: the widest margin that a link may have.
+CLEAR = {"snr_offset_db": 60.0, "base_power_dbm": 60.0, "train_power_dbm": 60.0}
 LAMBDA_M = SPEED_OF_LIGHT_M_PER_S / DOWN_HZ[1]
 
 
@@ -41,7 +45,16 @@ def medium(count: int = 1, seed: int = 1, **more: Any) -> CbtcMedium:
         "trains": tuple(f"t{n}" for n in range(count)),
         "downlink_hz": DOWN_HZ,
         "uplink_hz": UP_HZ,
+        "sample_rate_hz": RATE_HZ,
+        "base_antennas": 2,
+        "train_antennas": 2,
+        "base_power_dbm": 30.0,
+        "train_power_dbm": 30.0,
+        "noise_figure_db": 6.0,
         "path_loss_exponent": 3.0,
+        "reach_m": 3000.0,
+        "rician_factor": 0.0,
+        "snr_offset_db": 0.0,
         **more,
     }
     return CbtcMedium(CbtcDescription(**described), seed, TICK_S)
@@ -246,7 +259,7 @@ def test_enough_nodes_are_taken() -> None:
 
 
 def test_ticks_join_without_a_step() -> None:
-    radio = medium(snr_offset_db=150.0, rician_factor=1.0)
+    radio = medium(**CLEAR, rician_factor=1.0)
     speed, path, a = 60.0, 1200.0, 8.0
     edges = []
     for tick in range(6):
@@ -265,7 +278,7 @@ def test_ticks_join_without_a_step() -> None:
 
 
 def test_along_a_run_the_channel_is_rayleigh_with_the_spectrum_of_jakes() -> None:
-    radio, speed_mps = medium(snr_offset_db=150.0), 80.0
+    radio, speed_mps = medium(**CLEAR), 80.0
     spans = [(n, n + 1) for n in range(0, SAMPLES, 400)]  # 1 ms, 8 cm
     sent = {0: [ones(start, 1, only=0) for start, _ in spans]}
     runs = []
@@ -285,7 +298,7 @@ def test_along_a_run_the_channel_is_rayleigh_with_the_spectrum_of_jakes() -> Non
 
 
 def test_a_train_that_stands_has_a_constant_channel() -> None:
-    radio = medium(snr_offset_db=150.0, rician_factor=2.0)
+    radio = medium(**CLEAR, rician_factor=2.0)
     heard = [
         without_noise(radio, radio.links(tick, 0.1 * tick, at(1200.0)), (0, 50), (39_000, 39_050))
         for tick in (0, 7)
@@ -296,7 +309,7 @@ def test_a_train_that_stands_has_a_constant_channel() -> None:
 
 
 def test_the_line_of_sight_shifts_up_before_the_mast_and_down_behind() -> None:
-    radio = medium(snr_offset_db=150.0, rician_factor=1e4)
+    radio = medium(**CLEAR, rician_factor=1e3)
     for chainage_m, cosine in ((800.0, -1.0), (1200.0, 1.0)):
         links = radio.links(1, 0.1, at(chainage_m, speed_mps=60.0))
         h = without_noise(radio, links, (38_000, SAMPLES))
@@ -384,8 +397,8 @@ def test_seeds_ticks_and_links_differ() -> None:
         ({"base_stations": masts((0.0, 3))}, "none for channel 3 of main_b0"),
         ({"uplink_hz": DOWN_HZ}, "nearer than 400000"),
         ({"base_antennas": 3}, "base_antennas"),
-        ({"faults": (CbtcFault(kind="jam", channel=7),)}, "on channel 7"),
-        ({"faults": (CbtcFault(kind="dead_base_station", base_station="x"),)}, "no base station x"),
+        ({"faults": (CbtcFault(kind="jam", channel=7, **ALWAYS),)}, "on channel 7"),
+        ({"faults": (DEAD,)}, "no base station x"),
         ({"sample_rate_hz": 400_003.0}, "whole number"),
     ],
 )

@@ -14,6 +14,7 @@ from typing import Any, get_type_hints
 
 from rail_corridor.equipment.registry import node_kinds, topics
 from rail_msgs_py.message_definition import type_name
+from rail_msgs_py.quantity import Quantity, quantity_of
 from rail_msgs_py.topics.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
 from rail_msgs_py.topics.tick import CLOCK, DONE, FAILED
 from rail_msgs_py.topics.topic import Topic
@@ -126,10 +127,10 @@ def parameter_table(kind: str) -> str:
         "|---|---|---|---|---|---|",
     ]
     for field in dataclasses.fields(parameters):
-        about = field.metadata
+        about = quantity_of(field)
         rows.append(
             f"| `{field.name}` | {_type(hints[field.name])} | {_value(field.default)}"
-            f" | {about['unit']} | {_bounds(about['low'], about['high'])} | {about['text']} |"
+            f" | {about.unit} | {_bounds(about)} | {about.text} |"
         )
     return "\n".join(rows) + "\n"
 
@@ -150,12 +151,15 @@ def _value(value: Any) -> str:
     return str(value) if value != "" else "empty"
 
 
-def _bounds(low: float, high: float) -> str:
+def _bounds(quantity: Quantity[Any]) -> str:
+    if quantity.choices:
+        return f"one of {', '.join(map(str, quantity.choices))}"
     parts = []
-    if math.isfinite(low):
-        parts.append(f"from {_value(float(low))}")
-    if math.isfinite(high):
-        parts.append(f"to {_value(float(high))}")
+    if math.isfinite(quantity.low):
+        word = "above" if quantity.low_open else "from"
+        parts.append(f"{word} {_value(float(quantity.low))}")
+    if math.isfinite(quantity.high):
+        parts.append(f"to {_value(float(quantity.high))}")
     return " ".join(parts)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
+from rail_world.line.description_base import quantity_of_field
 from rail_world.trains.description import Davis, VehicleDescription
 
 from .schema import models_of, scenario_model
@@ -30,6 +31,9 @@ def _table(model: type[BaseModel]) -> str:
     ]
     for name, field in model.model_fields.items():
         meaning = field.description or "which kind it is"
+        quantity = quantity_of_field(field)
+        if quantity is not None and quantity.choices:
+            meaning += f"; one of {', '.join(map(str, quantity.choices))}"
         if bounds := _bounds(field.metadata):
             meaning += f"; {bounds}"
         rows.append(f"| `{name}` | {_default(model, field)} | {meaning} |")

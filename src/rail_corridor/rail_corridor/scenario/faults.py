@@ -6,9 +6,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from rail_world.line.description_base import Description, Name, Number
-
-from .section_fields import Time
+from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END, SLIP_RATIO
+from rail_world.line.description_base import Description, Name, Number, field_of
 
 
 class Fault(Description):
@@ -26,8 +25,8 @@ class Fault(Description):
 class TimedFault(Fault):
     """A fault that lasts from one time to another."""
 
-    from_s: Time = Field(default=0.0, description="start [s]")
-    to_s: Time = Field(default=1e6, description="end [s]")
+    from_s: Number = field_of(FAULT_BEGIN)
+    to_s: Number = field_of(FAULT_END)
 
     @model_validator(mode="after")
     def _has_a_duration(self) -> TimedFault:
@@ -48,4 +47,4 @@ class WheelSlip(TimedFault):
 
     kind: Literal["wheel_slip"]
     train: Name = Field(description="the train")
-    ratio: Number = Field(ge=0.0, le=3.0, description="speed of the wheels over that of the train")
+    ratio: Number = field_of(SLIP_RATIO)

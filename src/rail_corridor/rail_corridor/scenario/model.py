@@ -11,8 +11,9 @@ from typing import Any, Final, Generic, TypeVar, cast
 from pydantic import Field, SerializeAsAny, model_validator
 from typing_extensions import Self
 
+from rail_msgs_py.quantities import SEED, TICK
 from rail_world.line.description import JunctionDescription, TrackDescription
-from rail_world.line.description_base import Description, Name, Number
+from rail_world.line.description_base import Description, Name, Number, field_of
 from rail_world.line.network import Network, build_network
 from rail_world.trains.description import TrainDescription
 
@@ -34,12 +35,12 @@ class Scenario(Description):
 
     name: Name = Field(description="name of the scenario")
     description: str = Field(default="", max_length=1000, description="one line about it")
-    seed: Whole = Field(default=1, ge=0, le=2**63 - 1, description="seed of every random draw")
+    seed: Whole = field_of(SEED)
     duration_s: Number = Field(gt=0.0, le=1e5, description="simulated time [s]")
     end_when_arrived: bool = Field(
         default=False, description="end earlier, when every train has arrived"
     )
-    tick_s: Number = Field(default=0.1, ge=0.01, le=1.0, description="time of one tick [s]")
+    tick_s: Number = field_of(TICK)
     tracks: dict[Name, TrackDescription] = Field(max_length=100, description="tracks by name")
     junctions: tuple[JunctionDescription, ...] = Field(
         default=(), max_length=100, description="facing points that join the tracks"

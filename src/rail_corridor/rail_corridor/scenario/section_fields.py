@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
-from rail_world.line.description_base import Number
+from rail_msgs_py.ranging.quantities import CHANNEL
+from rail_world.line.description_base import Number, range_of
 
 
 def _not_a_bool(value: object) -> object:
@@ -16,9 +17,7 @@ def _not_a_bool(value: object) -> object:
 
 
 Whole = Annotated[int, BeforeValidator(_not_a_bool)]
-ChannelNumber = Annotated[Whole, Field(ge=1, le=99)]
-ChannelPair = tuple[ChannelNumber, ChannelNumber]
+ChannelNumber = Annotated[Whole, range_of(CHANNEL)]
 Time = Annotated[Number, Field(ge=0.0, le=1e6)]
 Frequency = Annotated[Number, Field(ge=1.0, le=1e9)]
-Power = Annotated[Number, Field(ge=-150.0, le=60.0)]
-Gain = Annotated[Number, Field(ge=-20.0, le=40.0)]
+ChannelPair = tuple[ChannelNumber, ChannelNumber]

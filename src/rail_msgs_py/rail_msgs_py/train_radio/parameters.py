@@ -10,6 +10,7 @@ from rail_signals.train_radio.slots import RadioSlots
 from rail_signals.train_radio.space_time_block import scheme
 from rail_signals.train_radio.symbol_mapping import constellation
 
+from . import quantities
 from .safe_frame import FRAME_BYTES
 
 
@@ -17,11 +18,11 @@ from .safe_frame import FRAME_BYTES
 class TrainRadioParameters:
     """Bursts, slots and what a receiver expects."""
 
-    scheme: str = parameter("alamouti_2x2", "siso, mrc, alamouti_2x1 or alamouti_2x2")
-    constellation: str = parameter("qpsk", "bpsk, qpsk or 16qam")
-    symbol_rate_hz: float = parameter(100e3, "symbols per second", unit="Hz", low=1e3, high=1e8)
-    samples_per_symbol: int = parameter(2, "complex samples per symbol", low=2, high=16)
-    pilot_period: int = parameter(16, "data symbols from pilots to pilots", low=1, high=1024)
+    scheme: str = quantities.SCHEME.parameter()
+    constellation: str = quantities.CONSTELLATION.parameter()
+    symbol_rate_hz: float = quantities.SYMBOL_RATE.parameter()
+    samples_per_symbol: int = quantities.SAMPLES_PER_SYMBOL.parameter()
+    pilot_period: int = quantities.PILOT_PERIOD.parameter()
     trains: int = parameter(1, "slots of trains", low=1, high=1000)
     doppler_hz: float = parameter(
         0.0, "largest Doppler shift that receivers follow", unit="Hz", low=0.0, high=1e5

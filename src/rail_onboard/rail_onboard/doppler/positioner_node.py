@@ -11,9 +11,11 @@ from math import inf
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from rail_msgs_py.doppler import quantities
 from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
 from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
+from rail_msgs_py.quantities import DIRECTION_OR_UNKNOWN, TRAIN_START
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import DOPPLER_FIX, DOPPLER_POSITION, REFERENCE_RX
@@ -30,10 +32,8 @@ class DopplerPositionerParameters(ReferenceToneParameters):
     """Parameters of a positioner; arrays over points of the line, or over stations."""
 
     track: str = parameter("main", "track it runs on, frame of its positions")
-    direction: int = parameter(
-        0, "1 or -1: towards greater or smaller chainages; 0 = not known", low=-1, high=1
-    )
-    start_m: float = parameter(0.0, "chainage of its front when put into service", unit="m")
+    direction: int = DIRECTION_OR_UNKNOWN.parameter()
+    start_m: float = TRAIN_START.parameter()
     placed_m: float = parameter(50.0, "how far off that may be", unit="m", low=0.1, high=1e5)
     line_chainage_m: tuple[float, ...] = parameter((), "chainages at equal steps", unit="m")
     line_x_m: tuple[float, ...] = parameter((), "places of the line there, east", unit="m")
@@ -44,12 +44,8 @@ class DopplerPositionerParameters(ReferenceToneParameters):
     station_x_m: tuple[float, ...] = parameter((), "place of its antenna, east", unit="m")
     station_y_m: tuple[float, ...] = parameter((), "north", unit="m")
     station_z_m: tuple[float, ...] = parameter((), "up", unit="m")
-    station_hz: float = parameter(
-        0.026, "standard deviation of a station's oscillator", unit="Hz", low=0.0, high=1e3
-    )
-    walk_hz: float = parameter(
-        0.5, "random walk of the own oscillator after a second", unit="Hz", low=0.0, high=1e3
-    )
+    station_hz: float = quantities.STATION_OFFSET_HZ.parameter()
+    walk_hz: float = quantities.RECEIVER_WALK.parameter()
     worst_sigma_m: float = parameter(
         50.0, "a position more uncertain than this is not given", unit="m", low=0.01, high=1e4
     )

@@ -17,9 +17,19 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.decoders import table_row
+from rail_msgs_py.localizer import quantities
 from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.position import figures_from_cdr as position_from_cdr
+from rail_msgs_py.quantities import (
+    CLAIM_SIGMAS,
+    DIRECTION,
+    GIVE_UP,
+    ODOMETER_ERROR,
+    PLACED_SIGMA,
+    TICK,
+    TRAIN_START,
+)
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
@@ -54,9 +64,9 @@ class LocalizerParameters:
     """Parameters of the localizer."""
 
     track: str = parameter("main", "track it runs on, frame of its positions")
-    direction: int = parameter(1, "1 or -1: towards greater or smaller chainages", low=-1, high=1)
-    start_m: float = parameter(0.0, "chainage of its front when put into service", unit="m")
-    placed_m: float = parameter(1.0, "standard deviation of that", unit="m", low=0.001, high=1e4)
+    direction: int = DIRECTION.parameter()
+    start_m: float = TRAIN_START.parameter()
+    placed_m: float = PLACED_SIGMA.parameter()
     doppler: bool = parameter(False, "whether there is a positioner by Doppler shifts")
     told: bool = parameter(False, "whether ranges are told to the train protection by radio")
     ranged: bool = parameter(False, "whether the zone controller's ranges are shared")
@@ -67,26 +77,18 @@ class LocalizerParameters:
     zone_starts_m: tuple[float, ...] = parameter(
         (), "chainages at which another station begins to range", unit="m"
     )
-    told_sigmas: float = parameter(
-        4.0, "half-width of a range that is told, in standard deviations", low=1.0, high=10.0
-    )
+    told_sigmas: float = CLAIM_SIGMAS.parameter()
     range_bias_m: float = parameter(
         0.5, "standard deviation of the lasting error of ranges", unit="m", low=0.0, high=100.0
     )
-    odometer_scale: float = parameter(
-        0.02, "standard deviation of the wheels' scale", low=0.0, high=0.2
-    )
+    odometer_scale: float = ODOMETER_ERROR.parameter()
     detection_s: float = parameter(
         0.5, "longest time from a joint to its notice", unit="s", low=0.0, high=10.0
     )
-    integrity_risk: float = parameter(
-        1e-5, "probability that the error exceeds the interval", low=1e-12, high=0.1
-    )
+    integrity_risk: float = quantities.INTEGRITY_RISK.parameter()
     oldest_s: float = parameter(1.5, "age that a reading may have", unit="s", low=0.0, high=10.0)
-    tick_s: float = parameter(0.1, "time of a tick", unit="s", low=0.01, high=1.0)
-    timeout_s: float = parameter(
-        2.0, "wall time after which a sensor is given up", unit="s", low=0.05, high=3600.0
-    )
+    tick_s: float = TICK.parameter()
+    timeout_s: float = GIVE_UP.parameter()
 
 
 def settings_of(p: LocalizerParameters) -> LocalizerSettings:

@@ -15,6 +15,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.decoders import samples
 from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.ranging import quantities
 from rail_msgs_py.ranging.signal_parameters import SignalParameters, signal_of
 from rail_msgs_py.table import TableWriter
 from rail_msgs_py.tick_node import EquipmentNode
@@ -32,21 +33,15 @@ from .downlink_check import DownlinkCheck
 class VrsParameters(SignalParameters):
     """Parameters of a vehicle station."""
 
-    downlink_channels: tuple[int, ...] = parameter((1, 3), "channels it hears", low=1)
-    uplink_channels: tuple[int, ...] = parameter((2, 4), "the channel paired with each", low=1)
-    uplink_carriers_hz: tuple[float, ...] = parameter(
-        (2.405e9, 2.415e9), "carrier of each uplink channel", unit="Hz", low=0.0
-    )
-    power_dbm: float = parameter(-10.0, "transmit power", unit="dBm", low=-100.0, high=60.0)
-    transponder_delay_s: float = parameter(
-        1e-6, "delay of this unit from reception to transmission", unit="s", low=0.0, high=1e-3
-    )
+    downlink_channels: tuple[int, ...] = quantities.DOWNLINKS.parameter()
+    uplink_channels: tuple[int, ...] = quantities.UPLINKS.parameter()
+    uplink_carriers_hz: tuple[float, ...] = quantities.UPLINK_CARRIERS.parameter()
+    power_dbm: float = quantities.VRS_POWER.parameter()
+    transponder_delay_s: float = quantities.UNIT_DELAY.parameter()
     delay_trim_s: float = parameter(
         0.0, "added on the bench to bring it to that of the fleet", unit="s", low=-1e-3, high=1e-3
     )
-    noise_dbm: float = parameter(
-        -100.0, "receiver noise expected in the bandwidth", unit="dBm", low=-150.0, high=0.0
-    )
+    noise_dbm: float = quantities.RECEIVER_NOISE.parameter()
 
 
 class VrsNode(EquipmentNode[VrsParameters], name="vrs", namespace="/train_1"):

@@ -14,6 +14,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_RX
+from rail_msgs_py.track_code import quantities
 from rail_msgs_py.waveform import Waveform
 from rail_signals.track_code.profile import load_profile, profile_names
 from rail_signals.track_code.receiver import FastTrackCodeReceiver
@@ -28,13 +29,9 @@ _FIELDS = ("speed", "gradient", "block_length", "network")
 class TrackCodeReceiverParameters:
     """Parameters of a receiver of track codes."""
 
-    profile: str = parameter("tones27", "profile of the code")
-    carriers_hz: tuple[float, ...] = parameter(
-        (1700.0, 2300.0), "carriers it listens to", unit="Hz", low=0.0
-    )
-    sample_rate_hz: float = parameter(
-        16_000.0, "sample rate at the antenna", unit="Hz", low=128.0, high=1e6
-    )
+    profile: str = quantities.PROFILE.parameter()
+    carriers_hz: tuple[float, ...] = quantities.CARRIERS.parameter()
+    sample_rate_hz: float = quantities.SAMPLE_RATE.parameter()
     least_level_db: float = parameter(
         -60.0, "level below which a carrier is not there", unit="dB", low=-200.0, high=100.0
     )

@@ -14,10 +14,12 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.decoders import table_row
 from rail_msgs_py.parameters import parameter
+from rail_msgs_py.quantities import ALLOWED_ODOMETER_ERROR, DIRECTION, GIVE_UP
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.track_code import CODE_RECEIVED
 from rail_msgs_py.topics.world import COMMAND, ODOMETER
+from rail_msgs_py.track_code import quantities
 from rail_onboard.localizer.located import located
 
 from .supervision import CodeSupervision
@@ -29,19 +31,13 @@ _FIELDS = ("speed", "gradient", "block_length", "network")
 class CodeSupervisionParameters:
     """Parameters of the supervision on board."""
 
-    braking_mps2: float = parameter(
-        0.5, "service braking that may be counted on", unit="m/s^2", low=0.05, high=5.0
-    )
-    odometer_error: float = parameter(
-        0.02, "relative error of distances that must be allowed for", low=0.0, high=0.5
-    )
+    braking_mps2: float = quantities.BRAKING.parameter()
+    odometer_error: float = ALLOWED_ODOMETER_ERROR.parameter()
     localizer: bool = parameter(
         False, "whether a localizer tells place and speed; where it knows none, the odometer does"
     )
-    direction: int = parameter(1, "1 or -1: towards greater or smaller chainages", low=-1, high=1)
-    timeout_s: float = parameter(
-        2.0, "wall time after which the receiver is given up", unit="s", low=0.05, high=3600.0
-    )
+    direction: int = DIRECTION.parameter()
+    timeout_s: float = GIVE_UP.parameter()
 
 
 class CodeSupervisionNode(

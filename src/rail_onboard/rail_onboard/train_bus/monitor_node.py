@@ -14,6 +14,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 
 from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.quantities import GIVE_UP, TICK
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.table import Table
 from rail_msgs_py.tick_node import EquipmentNode
@@ -25,6 +26,7 @@ from rail_msgs_py.topics.train_bus import (
     REFLECTOMETER_RX,
     REFLECTOMETER_TX,
 )
+from rail_msgs_py.train_bus import quantities
 from rail_msgs_py.waveform import Waveform, silence
 from rail_signals.train_bus.faults import KINDS
 from rail_signals.train_bus.tdr.interpretation import Interpretation, interpret
@@ -42,28 +44,18 @@ _LEVELS = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
 class TrainBusMonitorParameters:
     """Parameters of a monitor."""
 
-    cars: tuple[str, ...] = parameter(
-        ("CM2", "CM3", "CM4"), "profile of the cable in each car, from the head"
-    )
-    period_s: float = parameter(
-        30.0, "time from one measurement to the next", unit="s", low=0.01, high=1e6
-    )
+    cars: tuple[str, ...] = quantities.CARS.parameter()
+    period_s: float = quantities.PERIOD.parameter()
     offset_s: float = parameter(0.0, "time of the first", unit="s", low=0.0, high=1e6)
-    traces: int = parameter(8, "traces of a measurement", low=1, high=64)
-    rise_time_s: float = parameter(
-        20e-9, "rise time of its edge, 10 to 90 %", unit="s", low=1e-10, high=1e-5
-    )
-    noise_rms: float = parameter(
-        1e-3, "noise of a sample of a trace, as a reflection", low=1e-6, high=0.1
-    )
+    traces: int = quantities.TRACES.parameter()
+    rise_time_s: float = quantities.REFLECTOMETER_RISE.parameter()
+    noise_rms: float = quantities.REFLECTOMETER_NOISE.parameter()
     false_alarm_rate: float = parameter(
         1e-6, "share of healthy measurements that may look faulty", low=1e-12, high=0.1
     )
     medium: str = parameter("/world/bus_medium", "full name of the node that carries the edges")
-    tick_s: float = parameter(0.25, "time of a tick", unit="s", low=0.01, high=1.0)
-    timeout_s: float = parameter(
-        2.0, "wall time after which the medium is given up", unit="s", low=0.05, high=3600.0
-    )
+    tick_s: float = TICK.parameter()
+    timeout_s: float = GIVE_UP.parameter()
 
 
 class TrainBusMonitorNode(

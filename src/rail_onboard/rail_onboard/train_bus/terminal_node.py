@@ -14,9 +14,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 
 from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.quantities import GIVE_UP, TICK
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.train_bus import BUS_LINK, BUS_RX, BUS_TX
+from rail_msgs_py.train_bus import quantities
 from rail_msgs_py.waveform import Waveform, silence
 from rail_signals.train_bus.frame import BusFrameFormat
 from rail_signals.train_bus.receiver import NOT_FOUND, BusFrameReceiver
@@ -30,22 +32,16 @@ class BusTerminalParameters:
     """Parameters of a terminal."""
 
     end: str = parameter("head", "end of the train it is at: head or tail")
-    bit_rate_hz: float = parameter(1e6, "bits per second", unit="Hz", low=1e3, high=1e8)
-    samples_per_bit: int = parameter(8, "samples of a bit, an even number", low=4, high=64)
-    rise_time_s: float = parameter(
-        150e-9, "rise time of the driver's edges", unit="s", low=0.0, high=1e-3
-    )
+    bit_rate_hz: float = quantities.BIT_RATE.parameter()
+    samples_per_bit: int = quantities.SAMPLES_PER_BIT.parameter()
+    rise_time_s: float = quantities.RISE_TIME.parameter()
     longest_delay_s: float = parameter(
         10e-6, "latest start of a frame within a block", unit="s", low=0.0, high=1e-3
     )
-    answer_timeout_s: float = parameter(
-        2.0, "age at which the word of the other end counts no more", unit="s", low=0.0, high=600.0
-    )
+    answer_timeout_s: float = quantities.ANSWER_TIMEOUT.parameter()
     medium: str = parameter("/world/bus_medium", "full name of the node that carries the frames")
-    tick_s: float = parameter(0.25, "time of a tick", unit="s", low=0.01, high=1.0)
-    timeout_s: float = parameter(
-        2.0, "wall time after which the medium is given up", unit="s", low=0.05, high=3600.0
-    )
+    tick_s: float = TICK.parameter()
+    timeout_s: float = GIVE_UP.parameter()
 
 
 class BusTerminalNode(EquipmentNode[BusTerminalParameters], name="bus_head", namespace="/train_1"):

@@ -15,10 +15,20 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.decoders import stamped, table_row
 from rail_msgs_py.parameters import parameter
+from rail_msgs_py.quantities import (
+    ALLOWED_ODOMETER_ERROR,
+    GIVE_UP,
+    PLACED,
+    SEED,
+    TICK,
+    TRAIN_LENGTH,
+    TRAIN_START,
+)
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE, TOLD_POSITION
 from rail_msgs_py.topics.train_radio import ATP_STATE, RADIO_TELEGRAMS, TRAIN_TELEGRAMS
 from rail_msgs_py.topics.world import COMMAND, ODOMETER
+from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
 from rail_msgs_py.train_radio.train_channel import train_end
 from rail_onboard.braking_curve import GuaranteedBraking
@@ -39,37 +49,27 @@ class AtpParameters:
 
     number: int = parameter(1, "number of the train in telegrams", low=1, high=0xEFFF)
     segment: int = parameter(0, "number of its track", low=0, high=0xFFFF)
-    start_m: float = parameter(0.0, "chainage of its front when put into service", unit="m")
-    placed_m: float = parameter(1.0, "how well that is known", unit="m", low=0.0, high=1e4)
-    length_m: float = parameter(100.0, "its length", unit="m", low=1.0, high=6000.0)
+    start_m: float = TRAIN_START.parameter()
+    placed_m: float = PLACED.parameter()
+    length_m: float = TRAIN_LENGTH.parameter()
     steepest_fall_permil: float = parameter(
         0.0, "steepest fall it runs on", unit="permil", low=0.0, high=100.0
     )
-    braking_mps2: float = parameter(
-        0.7, "service braking that may be counted on", unit="m/s^2", low=0.05, high=5.0
-    )
-    emergency_mps2: float = parameter(
-        0.9, "emergency braking that may be counted on", unit="m/s^2", low=0.05, high=5.0
-    )
+    braking_mps2: float = quantities.BRAKING.parameter()
+    emergency_mps2: float = quantities.EMERGENCY_BRAKING.parameter()
     traction_mps2: float = parameter(
         1.0, "most acceleration of its motors", unit="m/s^2", low=0.0, high=5.0
     )
     margin_m: float = parameter(
         5.0, "kept before the end of authority", unit="m", low=0.0, high=1e4
     )
-    odometer_error: float = parameter(
-        0.02, "relative error of distances that must be allowed for", low=0.0, high=0.5
-    )
-    authority_timeout_s: float = parameter(
-        3.0, "age of an authority that makes the train brake", unit="s", low=0.1, high=600.0
-    )
+    odometer_error: float = ALLOWED_ODOMETER_ERROR.parameter()
+    authority_timeout_s: float = quantities.AUTHORITY_TIMEOUT.parameter()
     localizer: bool = parameter(False, "whether the position is that of a localizer")
     secret: str = parameter("00" * 16, "of the safe channel, in hexadecimal digits")
-    seed: int = parameter(0, "of the nonces of the safe channel", low=0)
-    tick_s: float = parameter(0.25, "time of a tick", unit="s", low=0.01, high=1.0)
-    timeout_s: float = parameter(
-        2.0, "wall time after which the radio is given up", unit="s", low=0.05, high=3600.0
-    )
+    seed: int = SEED.parameter()
+    tick_s: float = TICK.parameter()
+    timeout_s: float = GIVE_UP.parameter()
 
 
 def protection_of(p: AtpParameters, restarts: int = 0) -> TrainProtection:

@@ -14,6 +14,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.decoders import samples, stamped
 from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.quantities import GIVE_UP, TICK
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_inputs import TickInputs
 from rail_msgs_py.tick_node import EquipmentNode
@@ -24,6 +25,7 @@ from rail_msgs_py.topics.train_radio import (
     RADIO_TELEGRAMS,
     TRAIN_TELEGRAMS,
 )
+from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.parameters import TrainRadioParameters, slots_of
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
 from rail_msgs_py.waveform import Waveform, silence
@@ -38,17 +40,11 @@ class CbtcRadioParameters(TrainRadioParameters):
     """Parameters of a train radio."""
 
     slot: int = parameter(1, "slot of the train", low=1, high=1000)
-    downlink_channels: tuple[int, ...] = parameter((1, 2), "channels it hears", low=1)
-    uplink_carriers_hz: tuple[float, ...] = parameter(
-        (2.45e9, 2.455e9), "carrier of the uplink paired with each", unit="Hz", low=0.0
-    )
-    power_dbm: float = parameter(
-        20.0, "transmit power of all antennas together", unit="dBm", low=-100.0, high=60.0
-    )
-    tick_s: float = parameter(0.25, "time of a tick", unit="s", low=0.01, high=1.0)
-    timeout_s: float = parameter(
-        2.0, "wall time after which the telegrams are given up", unit="s", low=0.05, high=3600.0
-    )
+    downlink_channels: tuple[int, ...] = quantities.DOWNLINK_CHANNELS.parameter()
+    uplink_carriers_hz: tuple[float, ...] = quantities.UPLINK_CARRIERS.parameter()
+    power_dbm: float = quantities.TRAIN_POWER.parameter()
+    tick_s: float = TICK.parameter()
+    timeout_s: float = GIVE_UP.parameter()
 
 
 class CbtcRadioNode(EquipmentNode[CbtcRadioParameters], name="cbtc_radio", namespace="/train_1"):

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from rail_msgs_py.doppler import quantities
 from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
-from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.parameters import ParameterError
+from rail_msgs_py.quantities import TICK
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import REFERENCE_TX
@@ -25,9 +27,9 @@ _CHANNEL = 1
 class ReferenceStationParameters(ReferenceToneParameters):
     """Parameters of a reference station."""
 
-    slot: int = parameter(0, "frequency slot of its tone", low=0, high=1000)
-    power_dbm: float = parameter(20.0, "radiated power", unit="dBm", low=-100.0, high=60.0)
-    tick_s: float = parameter(0.1, "time of a tick", unit="s", low=0.01, high=1.0)
+    slot: int = quantities.SLOT.parameter()
+    power_dbm: float = quantities.POWER.parameter()
+    tick_s: float = TICK.parameter()
 
 
 class ReferenceStationNode(

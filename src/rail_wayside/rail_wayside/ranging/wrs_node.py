@@ -13,6 +13,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.ranging import quantities
 from rail_msgs_py.ranging.range_reading import RangeWriter
 from rail_msgs_py.ranging.signal_parameters import SignalParameters, signal_of
 from rail_msgs_py.stamps import clock_from_cdr
@@ -30,19 +31,13 @@ class WrsParameters(SignalParameters):
     """Parameters of a wayside station."""
 
     zones: tuple[str, ...] = parameter(("zone1",), "zones it looks into, an antenna each")
-    downlink_channels: tuple[int, ...] = parameter((1,), "channel it sends on, per zone", low=1)
-    uplink_channels: tuple[int, ...] = parameter((2,), "channel it hears on, per zone", low=1)
-    downlink_carriers_hz: tuple[float, ...] = parameter(
-        (2.4e9,), "carrier of the downlink channel, per zone", unit="Hz", low=0.0
-    )
-    power_dbm: float = parameter(-10.0, "transmit power", unit="dBm", low=-100.0, high=60.0)
-    comparator: str = parameter("quadrature", "phase comparator: and, quadrature or two_tone")
-    delay_s: float = parameter(
-        1e-6, "calibrated delay of the transponders", unit="s", low=0.0, high=1e-3
-    )
-    noise_dbm: float = parameter(
-        -100.0, "receiver noise expected in the bandwidth", unit="dBm", low=-150.0, high=0.0
-    )
+    downlink_channels: tuple[int, ...] = quantities.STATION_DOWNLINKS.parameter()
+    uplink_channels: tuple[int, ...] = quantities.STATION_UPLINKS.parameter()
+    downlink_carriers_hz: tuple[float, ...] = quantities.STATION_CARRIERS.parameter()
+    power_dbm: float = quantities.WRS_POWER.parameter()
+    comparator: str = quantities.COMPARATOR.parameter()
+    delay_s: float = quantities.TRANSPONDER_DELAY.parameter()
+    noise_dbm: float = quantities.RECEIVER_NOISE.parameter()
 
 
 @dataclass

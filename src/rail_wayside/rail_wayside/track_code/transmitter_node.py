@@ -18,9 +18,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.decoders import table_row
 from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.quantities import GIVE_UP, TICK
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.track_code import CIRCUIT_RX, CIRCUIT_TX, CODE_SENT, OCCUPANCY
+from rail_msgs_py.track_code import quantities
 from rail_msgs_py.waveform import Waveform, silence, silent_stamp_ns
 from rail_signals.ranging.band_level import band_levels_db
 from rail_signals.track_code.profile import load_profile, profile_names
@@ -37,25 +39,21 @@ OCCUPIED_BELOW_DB = 12.0
 class TrackCodeTransmitterParameters:
     """Parameters of a track circuit; arrays: the circuit itself, then those ahead of it."""
 
-    profile: str = parameter("tones27", "profile of the code")
-    carrier_hz: float = parameter(1700.0, "carrier", unit="Hz", low=1.0)
-    sample_rate_hz: float = parameter(16_000.0, "sample rate in the rails", unit="Hz", low=128.0)
-    tick_s: float = parameter(0.1, "time of one tick", unit="s", low=0.01, high=1.0)
+    profile: str = quantities.PROFILE.parameter()
+    carrier_hz: float = quantities.CARRIER.parameter()
+    sample_rate_hz: float = quantities.SAMPLE_RATE.parameter()
+    tick_s: float = TICK.parameter()
     ahead: tuple[str, ...] = parameter((), "circuits ahead, the nearest first")
-    lengths_m: tuple[float, ...] = parameter((500.0,), "lengths", unit="m", low=1.0)
+    lengths_m: tuple[float, ...] = quantities.LENGTHS.parameter()
     limits_mps: tuple[float, ...] = parameter((20.0,), "speed limits", unit="m/s", low=0.0)
     gradients_permil: tuple[float, ...] = parameter(
         (0.0,), "steepest falls, negative downhill", unit="permil"
     )
-    braking_mps2: float = parameter(
-        0.5, "braking the code counts on", unit="m/s^2", low=0.05, high=5.0
-    )
+    braking_mps2: float = quantities.BRAKING.parameter()
     clear_level_db: float = parameter(
         0.0, "level at the receiving end while the circuit is clear", unit="dB"
     )
-    timeout_s: float = parameter(
-        2.0, "wall time after which an occupancy is given up", unit="s", low=0.05, high=3600.0
-    )
+    timeout_s: float = GIVE_UP.parameter()
 
 
 class TrackCodeTransmitterNode(

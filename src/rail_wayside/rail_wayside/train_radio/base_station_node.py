@@ -19,6 +19,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.decoders import stamped
 from rail_msgs_py.parameters import parameter
+from rail_msgs_py.quantities import GIVE_UP, TICK
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.train_radio import (
@@ -28,6 +29,7 @@ from rail_msgs_py.topics.train_radio import (
     DOWN_TELEGRAMS,
     UP_TELEGRAMS,
 )
+from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.parameters import TrainRadioParameters, slots_of
 from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
@@ -43,18 +45,14 @@ BEACON = bytes(range(FRAME_BYTES))
 class CbtcBaseStationParameters(TrainRadioParameters):
     """Parameters of a base station."""
 
-    downlink_carrier_hz: float = parameter(2.4e9, "carrier it sends on", unit="Hz", low=0.0)
+    downlink_carrier_hz: float = quantities.DOWNLINK_CARRIER.parameter()
     downlink_channel: int = parameter(1, "its channel number", low=1)
-    power_dbm: float = parameter(
-        20.0, "transmit power of both antennas together", unit="dBm", low=-100.0, high=60.0
-    )
+    power_dbm: float = quantities.BASE_POWER.parameter()
     backbone: bool = parameter(
         False, "whether the backbone brings the telegrams, instead of the zone controller itself"
     )
-    tick_s: float = parameter(0.25, "time of a tick", unit="s", low=0.01, high=1.0)
-    timeout_s: float = parameter(
-        2.0, "wall time after which the telegrams are given up", unit="s", low=0.05, high=3600.0
-    )
+    tick_s: float = TICK.parameter()
+    timeout_s: float = GIVE_UP.parameter()
 
 
 class CbtcBaseStationNode(

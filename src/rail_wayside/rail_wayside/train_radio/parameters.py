@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.quantities import CLAIM_SIGMAS, PLACED, SEED, TICK
+from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.train_channel import controller_end
 
 from .authority_issuer import AuthorityDesk
@@ -38,16 +40,16 @@ class AuthorityParameters:
     leaves_at_m: tuple[float, ...] = parameter(
         (), "where it passes to the next control area; 0 = nowhere", unit="m", low=0.0
     )
-    placed_m: float = parameter(1.0, "how well the fronts are known at first", unit="m", low=0.0)
-    margin_m: float = parameter(10.0, "kept behind a train", unit="m", low=0.0, high=1e4)
+    placed_m: float = PLACED.parameter()
+    margin_m: float = quantities.MARGIN.parameter()
     end_margin_m: float = parameter(
         5.0, "kept before the end of a track", unit="m", low=0.0, high=1e4
     )
-    validity_s: float = parameter(3.0, "of an authority", unit="s", low=0.1, high=600.0)
-    fix_sigmas: float = parameter(4.0, "half-width of ranges told to trains", low=1.0, high=20.0)
+    validity_s: float = quantities.AUTHORITY_TIMEOUT.parameter()
+    fix_sigmas: float = CLAIM_SIGMAS.parameter()
     secret: str = parameter("00" * 16, "of the safe channels, in hexadecimal digits")
-    seed: int = parameter(0, "of the nonces of the safe channels", low=0)
-    tick_s: float = parameter(0.25, "time of a tick", unit="s", low=0.01, high=1.0)
+    seed: int = SEED.parameter()
+    tick_s: float = TICK.parameter()
 
 
 def desk_of(p: AuthorityParameters) -> AuthorityDesk | None:

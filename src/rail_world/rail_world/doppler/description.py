@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from rail_world.line.description_base import Chainage, Description, Length, Name, Number
+from rail_msgs_py.doppler import quantities
+from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
+from rail_world.line.description_base import (
+    Chainage,
+    Description,
+    Length,
+    Name,
+    Number,
+    range_of,
+)
 from rail_world.ranging.description import Vector
 
 
@@ -27,9 +36,15 @@ class ReferenceFault(Description):
 
     kind: Literal["dead_reference", "detuned_reference"]
     station: Name
-    from_s: Number = Field(default=0.0, ge=0.0)
-    to_s: Number = Field(default=1e9, ge=0.0)
-    shift_hz: Number = Field(default=0.0, ge=-1e5, le=1e5, description="of its oscillator [Hz]")
+    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
+    to_s: Annotated[Number, range_of(FAULT_END)]
+    shift_hz: Annotated[Number, range_of(quantities.DETUNING)] | None = None
+
+    @model_validator(mode="after")
+    def _is_of_its_kind(self) -> ReferenceFault:
+        if (self.shift_hz is None) == (self.kind == "detuned_reference"):
+            raise ValueError(f"shift_hz: {self.shift_hz} does not agree with {self.kind}")
+        return self
 
     def acts(self, time_s: float) -> bool:
         """Whether it is there at a simulated time [s]."""
@@ -39,28 +54,21 @@ class ReferenceFault(Description):
 class ReferenceDescription(Description):
     """Everything the medium of the reference tones knows besides where the trains are.
 
-    Powers are radiated ones (EIRP); a train's antenna has no gain and hears all around. The
-    defaults are typical magnitudes, assumed here.
+    Powers are radiated ones (EIRP); a train's antenna has no gain and hears all around.
     """
 
     stations: tuple[ReferenceStation, ...] = Field(min_length=1, max_length=10_000)
     trains: tuple[str, ...] = ()
     tracks: tuple[str, ...] = Field(description="order that counts the tracks")
-    carrier_hz: Number = Field(gt=0.0, le=1e11)
-    sample_rate_hz: Number = Field(gt=0.0, le=1e8)
-    samples: int = Field(gt=0, le=1 << 20, description="in a block")
-    noise_figure_db: Number = Field(default=8.0, ge=0.0, le=30.0)
-    path_loss_exponent: Number = Field(default=2.0, ge=1.5, le=6.0)
-    extra_loss_db: Number = Field(
-        default=0.0, ge=-60.0, le=120.0, description="taken from every link [dB]"
-    )
-    reach_m: Length = Field(default=2000.0, description="past which nothing is heard [m]")
-    receiver_ppm: Number = Field(
-        default=0.5, ge=0.0, le=10.0, description="largest offset of a train's oscillator [ppm]"
-    )
-    station_ppb: Number = Field(
-        default=0.01, ge=0.0, le=1000.0, description="standard deviation of a station's [ppb]"
-    )
+    carrier_hz: Annotated[Number, range_of(quantities.CARRIER)]
+    sample_rate_hz: Annotated[Number, range_of(quantities.SAMPLE_RATE)]
+    samples: Annotated[int, range_of(quantities.SAMPLES)]
+    noise_figure_db: Annotated[Number, range_of(quantities.NOISE_FIGURE)]
+    path_loss_exponent: Annotated[Number, range_of(quantities.PATH_LOSS_EXPONENT)]
+    extra_loss_db: Annotated[Number, range_of(quantities.EXTRA_LOSS)]
+    reach_m: Length = Field(description="past which nothing is heard [m]")
+    receiver_ppm: Annotated[Number, range_of(quantities.RECEIVER_OFFSET)]
+    station_ppb: Annotated[Number, range_of(quantities.STATION_OFFSET)]
     faults: tuple[ReferenceFault, ...] = ()
 
     @model_validator(mode="after")

@@ -115,7 +115,7 @@ class ReferenceMedium:
         names = {station.name: index for index, station in enumerate(self.description.stations)}
         for fault in self.description.faults:
             if fault.acts(time_s):
-                if fault.kind == "dead_reference":
+                if fault.shift_hz is None:  # a dead station
                     dead.add(names[fault.station])
                 else:
                     shift_hz[names[fault.station]] += fault.shift_hz

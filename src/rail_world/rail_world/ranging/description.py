@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from rail_world.line.description_base import Description
+from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
+from rail_msgs_py.ranging import quantities
+from rail_world.line.description_base import Description, range_of
 
 Vector = tuple[float, float, float]
-Channel = Annotated[int, Field(ge=1, le=99)]
+Channel = Annotated[int, range_of(quantities.CHANNEL)]
 
 
 class AntennaPattern(Description):
     """Directional antenna with a parabolic main lobe and a flat back (3GPP TR 36.942 form)."""
 
-    gain_dbi: float = Field(12.0, ge=-20.0, le=40.0, description="on the axis")
-    beamwidth_deg: float = Field(60.0, ge=5.0, le=180.0, description="between the -3 dB points")
-    front_to_back_db: float = Field(30.0, ge=0.0, le=60.0, description="axis to back")
+    gain_dbi: Annotated[float, range_of(quantities.GAIN)]
+    beamwidth_deg: Annotated[float, range_of(quantities.BEAMWIDTH)]
+    front_to_back_db: Annotated[float, range_of(quantities.FRONT_TO_BACK)]
 
 
 class StationAntenna(Description):
@@ -36,27 +38,36 @@ class Fault(Description):
     """Something that goes wrong in the radio, from and to a simulated time."""
 
     kind: Literal["dead_station", "jam"]
-    from_s: float = Field(0.0, ge=0.0)
-    to_s: float = Field(1e9, ge=0.0)
+    from_s: Annotated[float, range_of(FAULT_BEGIN)]
+    to_s: Annotated[float, range_of(FAULT_END)]
     station: str | None = None
     channel: Channel | None = None
-    power_dbm: float = Field(0.0, ge=-150.0, le=60.0, description="of the jammer")
-    position_m: Vector = (0.0, 0.0, 0.0)
+    power_dbm: Annotated[float, range_of(quantities.JAMMER_POWER)] | None = None
+    position_m: Vector | None = None
+
+    @model_validator(mode="after")
+    def _is_of_its_kind(self) -> Fault:
+        wanted = {"station": self.kind == "dead_station"}
+        wanted["channel"] = wanted["power_dbm"] = wanted["position_m"] = self.kind == "jam"
+        for field, want in wanted.items():
+            if (getattr(self, field) is not None) != want:
+                raise ValueError(f"{field}: does not agree with {self.kind}")
+        return self
 
 
 class RadioDescription(Description):
     """Everything the radio medium knows besides where the trains are."""
 
-    sample_rate_hz: float = Field(gt=0.0)
-    samples: int = Field(gt=0)
+    sample_rate_hz: Annotated[float, range_of(quantities.SAMPLE_RATE)]
+    samples: Annotated[int, range_of(quantities.SAMPLES)]
     carriers_hz: dict[Channel, float]
     stations: tuple[StationAntenna, ...]
     trains: tuple[str, ...]
-    station_pattern: AntennaPattern = AntennaPattern()
-    train_pattern: AntennaPattern = AntennaPattern(gain_dbi=6.0)
-    path_loss_exponent: float = Field(2.0, ge=1.5, le=6.0)
-    noise_figure_db: float = Field(8.0, ge=0.0, le=30.0)
-    oscillator_ppm: float = Field(0.1, ge=0.0, le=1.0, description="1 sigma of each unit")
+    station_pattern: AntennaPattern
+    train_pattern: AntennaPattern
+    path_loss_exponent: Annotated[float, range_of(quantities.PATH_LOSS_EXPONENT)]
+    noise_figure_db: Annotated[float, range_of(quantities.NOISE_FIGURE)]
+    oscillator_ppm: Annotated[float, range_of(quantities.OSCILLATOR)]
     sensitivity_db: float = Field(
         -20.0, ge=-60.0, le=60.0, description="links weaker than this over noise are not computed"
     )

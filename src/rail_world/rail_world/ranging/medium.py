@@ -287,8 +287,8 @@ class RadioMedium:
         radio = self.description
         total = 0.0
         for fault in radio.faults:
-            if fault.kind != "jam" or not fault.from_s <= time_s < fault.to_s:
-                continue
+            if fault.power_dbm is None or not fault.from_s <= time_s < fault.to_s:
+                continue  # a dead station has no power
             if fault.channel != port[1]:
                 continue
             if uplink:

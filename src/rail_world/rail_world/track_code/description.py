@@ -7,11 +7,19 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from rail_world.line.description_base import Chainage, Description, Name, Number, whole_samples
+from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
+from rail_msgs_py.track_code import quantities
+from rail_world.line.description_base import (
+    Chainage,
+    Description,
+    Name,
+    Number,
+    range_of,
+    whole_samples,
+)
 
 Decibels = Annotated[Number, Field(ge=0.0, le=200.0)]
 Volts = Annotated[Number, Field(ge=0.0, le=1e4)]
-Seconds = Annotated[Number, Field(ge=0.0, le=1e9)]
 
 
 class TrackCircuit(Description):
@@ -21,7 +29,7 @@ class TrackCircuit(Description):
     track: Name
     start_m: Chainage = Field(description="entry end [m]")
     end_m: Chainage = Field(description="exit end, that trains run towards [m]")
-    carrier_hz: Number = Field(gt=0.0, le=1e5, description="carrier of the transmitter [Hz]")
+    carrier_hz: Annotated[Number, range_of(quantities.CARRIER)]
 
     @model_validator(mode="after")
     def _has_length(self) -> TrackCircuit:
@@ -46,12 +54,12 @@ class RailFault(Description):
     """
 
     kind: Literal["sanding", "broken_rail", "dead_transmitter"]
-    from_s: Seconds = 0.0
-    to_s: Seconds = 1e9
+    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
+    to_s: Annotated[Number, range_of(FAULT_END)]
     train: str | None = None
     circuit: str | None = None
     at_m: Chainage | None = None
-    loss_db: Decibels = 60.0
+    loss_db: Annotated[Number, range_of(quantities.SANDING_LOSS)] | None = None
 
     @model_validator(mode="after")
     def _names_its_place(self) -> RailFault:
@@ -59,6 +67,8 @@ class RailFault(Description):
             raise ValueError(f"train: goes with sanding, and only with it, not {self.kind}")
         if (self.circuit is None) != (self.kind == "sanding"):
             raise ValueError(f"circuit: does not agree with {self.kind}")
+        if (self.loss_db is None) != (self.kind == "dead_transmitter"):
+            raise ValueError(f"loss_db: {self.loss_db} does not agree with {self.kind}")
         if self.at_m is not None and self.kind != "broken_rail":
             raise ValueError(f"at_m: goes with broken_rail only, not {self.kind}")
         return self
@@ -68,7 +78,7 @@ class RailDescription(Description):
     """Everything the rail medium knows besides where the trains are.
 
     Levels are amplitudes referred to the terminals of an antenna over the rails, or of a
-    receiver at them. The defaults are typical magnitudes, assumed here.
+    receiver at them. What no scenario sets has a typical magnitude, assumed here.
     """
 
     circuits: tuple[TrackCircuit, ...] = Field(min_length=1, max_length=100_000)
@@ -76,18 +86,16 @@ class RailDescription(Description):
         default=(), description="order that counts the tracks; empty = as the circuits name them"
     )
     trains: tuple[str, ...] = ()
-    sample_rate_hz: Number = Field(default=16_000.0, gt=0.0, le=1e6)
+    sample_rate_hz: Annotated[Number, range_of(quantities.SAMPLE_RATE)]
     transmit_level_v: Volts = Field(
         default=1.0, description="amplitude that a transmitted sample of 1 has at its feed [V]"
     )
-    attenuation_db_per_km: Decibels = Field(default=6.0, description="of compensated rails")
-    joint_attenuation_db: Decibels = Field(default=40.0, description="across one joint")
+    attenuation_db_per_km: Annotated[Number, range_of(quantities.ATTENUATION)]
+    joint_attenuation_db: Annotated[Number, range_of(quantities.JOINT_LOSS)]
     shunt_attenuation_db: Decibels = Field(default=50.0, description="past the axles of a train")
-    white_noise_v: Volts = Field(default=1e-3, description="rms of a sample [V]")
-    impulse_rate_per_s: Number = Field(
-        default=0.0, ge=0.0, le=1e4, description="of each antenna and receiver [1/s]"
-    )
-    impulse_amplitude_v: Volts = Field(default=0.0, description="mean height of an impulse [V]")
+    white_noise_v: Volts = Field(description="rms of a sample [V]")
+    impulse_rate_per_s: Annotated[Number, range_of(quantities.IMPULSE_RATE)]
+    impulse_amplitude_v: Volts = Field(description="mean height of an impulse [V]")
     fundamental_hz: Number = Field(default=50.0, gt=0.0, le=1000.0, description="of the traction")
     harmonics: tuple[Harmonic, ...] = ()
     faults: tuple[RailFault, ...] = ()

@@ -228,7 +228,7 @@ class RailMedium:
         for fault in rails.faults:
             if not fault.from_s <= time_s < fault.to_s:
                 continue
-            if fault.kind == "dead_transmitter":
+            if fault.loss_db is None:  # a dead transmitter
                 known &= circuit != self._index[str(fault.circuit)]
             elif fault.kind == "broken_rail":
                 at = self._place[self._index[str(fault.circuit)]]
@@ -277,8 +277,10 @@ class RailMedium:
         """What sand between wheels and rails leaves of the signal [train]."""
         left = np.ones(len(self._train))
         for fault in self.description.faults:
-            if fault.kind == "sanding" and fault.from_s <= time_s < fault.to_s:
-                left[self._train[str(fault.train)]] *= 10.0 ** (fault.loss_db / -20.0)
+            if fault.train is None or fault.loss_db is None:
+                continue  # nothing that one train does
+            if fault.from_s <= time_s < fault.to_s:
+                left[self._train[fault.train]] *= 10.0 ** (fault.loss_db / -20.0)
         return left
 
     def _harmonics(self, tick: int) -> FloatArray:

@@ -7,9 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from rail_world.line.description_base import Description, Name, Number
+from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
+from rail_msgs_py.train_bus import quantities
+from rail_world.line.description_base import Description, Name, Number, range_of
 
-Seconds = Annotated[Number, Field(ge=0.0, le=1e9)]
 Ohms = Annotated[Number, Field(gt=0.0, le=1e6)]
 
 FaultKind = Literal[
@@ -30,18 +31,18 @@ class BusFaultDescription(Description):
     """
 
     fault: FaultKind
-    from_s: Seconds
-    to_s: Seconds
+    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
+    to_s: Annotated[Number, range_of(FAULT_END)]
     law: Literal["linear", "exponential"]
-    size: Number = Field(gt=0.0, le=1e6, description="when it has grown, in the unit of its kind")
-    at_m: Number = Field(default=0.0, ge=0.0, le=1e4)
-    length_m: Number = Field(default=0.0, ge=0.0, le=1e4, description="of cable that is wet")
-    conductance_us_per_m: Number = Field(default=0.0, ge=0.0, le=1e4)
-    car: int = Field(default=1, ge=1, le=100)
-    coupler: int = Field(default=1, ge=1, le=100)
-    profile: str = Field(default="", description="whose cable is there instead")
-    noise_factor: Number = Field(default=1.0, ge=1.0, le=1e3)
-    spread: Number = Field(default=0.0, ge=0.0, le=2.0)
+    size: Annotated[Number, range_of(quantities.FAULT_SIZE)]
+    at_m: Annotated[Number, range_of(quantities.FAULT_PLACE)]
+    length_m: Annotated[Number, range_of(quantities.WET_LENGTH)]
+    conductance_us_per_m: Annotated[Number, range_of(quantities.WET_CONDUCTANCE)]
+    car: Annotated[int, range_of(quantities.FAULT_CAR)]
+    coupler: Annotated[int, range_of(quantities.FAULT_COUPLER)]
+    profile: str = Field(description="whose cable is there instead; empty = nobody's")
+    noise_factor: Annotated[Number, range_of(quantities.NOISE_FACTOR)]
+    spread: Annotated[Number, range_of(quantities.CONTACT_SPREAD)]
 
 
 class TrainBus(Description):
@@ -56,14 +57,14 @@ class BusDescription(Description):
     """Everything the bus medium knows."""
 
     trains: tuple[TrainBus, ...] = Field(min_length=1)
-    bit_rate_hz: Number = Field(gt=0.0, le=1e8)
-    samples_per_bit: int = Field(ge=4, le=64)
-    level_v: Number = Field(gt=0.0, le=1e3, description="of the drivers, into a matched line")
-    noise_v: Number = Field(ge=0.0, le=1e3, description="rms of a sample at a receiver")
+    bit_rate_hz: Annotated[Number, range_of(quantities.BIT_RATE)]
+    samples_per_bit: Annotated[int, range_of(quantities.SAMPLES_PER_BIT)]
+    level_v: Annotated[Number, range_of(quantities.LEVEL)]
+    noise_v: Annotated[Number, range_of(quantities.NOISE)]
     source_ohm: Ohms = Field(description="terminator at the head")
     longest_delay_s: Number = Field(gt=0.0, le=1e-3)
     reference_ohm: Ohms = Field(description="output of the reflectometer")
-    reflectometer_noise: Number = Field(ge=0.0, le=1.0, description="rms, as a reflection")
+    reflectometer_noise: Annotated[Number, range_of(quantities.REFLECTOMETER_NOISE)]
 
     @property
     def sample_rate_hz(self) -> float:

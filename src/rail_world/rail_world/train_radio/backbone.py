@@ -34,7 +34,7 @@ from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.train_radio.train_channel import CONTROLLER_IDENTITY
 
 from .frame_threats import AFTER_NS, FrameThreats, Link, Threat, ThreatRates
-from .threat_description import LONGEST_DELAY_S, ThreatPeriod, rates_at
+from .threat_description import ThreatPeriod, rates_at
 
 #: Slot and frame of each telegram, by base station.
 Frames: TypeAlias = Mapping[str, Iterable[tuple[int, bytes]]]
@@ -58,7 +58,7 @@ class Backbone:
     ) -> None:
         self._bases = tuple(bases)
         self._periods = tuple(periods)
-        self._threats = FrameThreats(ThreatRates(), rng, longest_delay_s=LONGEST_DELAY_S)
+        self._threats = FrameThreats(ThreatRates(), rng)
         self._by: dict[Link, tuple[str, ...]] = {}
         self._arrived: list[tuple[Link, bytes]] = []
         #: Frames carried; what the intruder adds is none of them.

@@ -16,6 +16,7 @@ import numpy as np
 
 from rail_msgs_py.decoders import stamped
 from rail_msgs_py.parameters import parameter
+from rail_msgs_py.quantities import GIVE_UP
 from rail_msgs_py.tick_inputs import TickInputs
 from rail_msgs_py.topics.train_radio import (
     BACKBONE_DOWN,
@@ -41,12 +42,8 @@ class BackboneParameters(MediumParameters):
     """Parameters of the backbone."""
 
     world_file: str = parameter("", "JSON file with tracks, trains, media and threats")
-    timeout_s: float = parameter(
-        2.5, "wall time after which a base station is given up", unit="s", low=0.05, high=3600.0
-    )
-    controller_timeout_s: float = parameter(
-        4.0, "wall time after which the controller is given up", unit="s", low=0.05, high=3600.0
-    )
+    timeout_s: float = GIVE_UP.but(default=2.5).parameter()
+    controller_timeout_s: float = GIVE_UP.but(default=4.0).parameter()
 
 
 class BackboneNode(MediumNode[BackboneParameters], name="backbone", namespace="/world"):

@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
+from rail_msgs_py.train_radio import quantities
 from rail_signals.train_radio.path_loss import Cutting, Section, Tunnel
 from rail_world.line.description_base import (
     Chainage,
@@ -15,6 +17,7 @@ from rail_world.line.description_base import (
     Length,
     Name,
     Number,
+    range_of,
     whole_samples,
 )
 from rail_world.ranging.description import Channel, Vector
@@ -22,8 +25,6 @@ from rail_world.ranging.description import Channel, Vector
 Antennas = Annotated[int, Field(ge=1, le=2, strict=True)]
 Hertz = Annotated[Number, Field(gt=0.0, le=1e11)]
 PowerDbm = Annotated[Number, Field(ge=-150.0, le=80.0)]
-SectionLoss = Annotated[Number, Field(ge=0.0, le=200.0)]
-Seconds = Annotated[Number, Field(ge=0.0, le=1e9)]
 
 
 class BaseStation(Description):
@@ -44,11 +45,9 @@ class LossSection(Description):
     from_m: Chainage
     to_m: Chainage
     edge_m: Number = Field(default=0.0, ge=0.0, description="over which it begins and ends [m]")
-    wall_loss_db: SectionLoss | None = Field(default=None, description="of a cutting")
-    entry_loss_db: SectionLoss | None = Field(default=None, description="of a portal")
-    loss_db_per_m: Annotated[Number, Field(ge=0.0, le=10.0)] | None = Field(
-        default=None, description="in a tunnel [dB/m]"
-    )
+    wall_loss_db: Annotated[Number, range_of(quantities.ENTRY_LOSS)] | None = None
+    entry_loss_db: Annotated[Number, range_of(quantities.ENTRY_LOSS)] | None = None
+    loss_db_per_m: Annotated[Number, range_of(quantities.TUNNEL_LOSS_PER_M)] | None = None
 
     @model_validator(mode="after")
     def _is_of_its_kind(self) -> LossSection:
@@ -84,8 +83,8 @@ class CbtcFault(Description):
     """
 
     kind: Literal["dead_base_station", "jam"]
-    from_s: Seconds = 0.0
-    to_s: Seconds = 1e9
+    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
+    to_s: Annotated[Number, range_of(FAULT_END)]
     base_station: str | None = None
     channel: Channel | None = None
     noise_dbm: PowerDbm = Field(default=-90.0, description="over the whole sample rate [dBm]")
@@ -107,8 +106,7 @@ class CbtcDescription(Description):
     """Everything the CBTC medium knows besides where the trains are.
 
     Powers are radiated ones (EIRP) of all antennas of a sender together, before a receiving
-    antenna without gain. Downlink and uplink of a channel have a carrier each (FDD). The defaults
-    are typical magnitudes, assumed here.
+    antenna without gain. Downlink and uplink of a channel have a carrier each (FDD).
     """
 
     base_stations: tuple[BaseStation, ...] = Field(min_length=1, max_length=10_000)
@@ -118,20 +116,16 @@ class CbtcDescription(Description):
     )
     downlink_hz: dict[Channel, Hertz] = Field(description="carriers to the trains [Hz]")
     uplink_hz: dict[Channel, Hertz] = Field(description="carriers from the trains [Hz]")
-    sample_rate_hz: Number = Field(default=400e3, gt=0.0, le=1e8)
-    base_antennas: Antennas = 2
-    train_antennas: Antennas = 2
-    base_power_dbm: PowerDbm = 30.0
-    train_power_dbm: PowerDbm = 30.0
-    noise_figure_db: Number = Field(default=6.0, ge=0.0, le=30.0)
-    path_loss_exponent: Number = Field(default=3.0, ge=1.5, le=6.0)
-    reach_m: Length = Field(default=3000.0, description="past which nothing is heard [m]")
-    rician_factor: Number = Field(
-        default=0.0, ge=0.0, le=1e4, description="line of sight over scattered power; 0 = Rayleigh"
-    )
-    snr_offset_db: Number = Field(
-        default=0.0, ge=-200.0, le=200.0, description="added to every gain; negative = less margin"
-    )
+    sample_rate_hz: Number = Field(gt=0.0, description="of the bursts, both ways [Hz]")
+    base_antennas: Antennas
+    train_antennas: Antennas
+    base_power_dbm: Annotated[Number, range_of(quantities.BASE_POWER)]
+    train_power_dbm: Annotated[Number, range_of(quantities.TRAIN_POWER)]
+    noise_figure_db: Annotated[Number, range_of(quantities.NOISE_FIGURE)]
+    path_loss_exponent: Annotated[Number, range_of(quantities.PATH_LOSS_EXPONENT)]
+    reach_m: Length = Field(description="past which nothing is heard [m]")
+    rician_factor: Annotated[Number, range_of(quantities.RICIAN_FACTOR)]
+    snr_offset_db: Annotated[Number, range_of(quantities.SNR_OFFSET)]
     sections: tuple[LossSection, ...] = ()
     faults: tuple[CbtcFault, ...] = ()
 

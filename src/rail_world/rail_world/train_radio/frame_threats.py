@@ -32,6 +32,7 @@ import numpy as np
 
 from rail_msgs_py.stamps import seconds_to_ns
 from rail_msgs_py.train_radio.fixed_point import check_number
+from rail_msgs_py.train_radio.quantities import LONGEST_DELAY
 from rail_msgs_py.train_radio.safe_frame import (
     CODE_BYTES,
     FRAME_BYTES,
@@ -120,7 +121,7 @@ class FrameThreats:
         rng: np.random.Generator,
         *,
         latency_s: float = 0.0,
-        longest_delay_s: float = 3.0,
+        longest_delay_s: float = LONGEST_DELAY.default,
         memory: int = 1024,
     ) -> None:
         check_number("latency_s", latency_s, 0.0, 60.0)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import Annotated, Final
+from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from rail_world.line.description_base import Description, Number
+from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
+from rail_msgs_py.train_radio import quantities
+from rail_world.line.description_base import Description, Number, range_of
 
 from .frame_threats import Threat, ThreatRates
 
@@ -23,9 +25,6 @@ def _each_once(threats: tuple[Threat, ...]) -> tuple[Threat, ...]:
 Threats = Annotated[
     tuple[Threat, ...], Field(min_length=1, max_length=100), AfterValidator(_each_once)
 ]
-Rate = Annotated[Number, Field(ge=0.0, le=1.0)]
-LongestDelay = Annotated[Number, Field(ge=0.0, le=3600.0)]
-LONGEST_DELAY_S: Final = 3.0
 
 
 class ThreatPeriod(Description):
@@ -35,10 +34,10 @@ class ThreatPeriod(Description):
     """
 
     threats: Threats
-    rate: Rate
-    from_s: Number = Field(default=0.0, ge=0.0, le=1e9)
-    to_s: Number = Field(default=1e9, ge=0.0, le=1e9)
-    longest_delay_s: LongestDelay = LONGEST_DELAY_S
+    rate: Annotated[Number, range_of(quantities.THREAT_RATE)]
+    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
+    to_s: Annotated[Number, range_of(FAULT_END)]
+    longest_delay_s: Annotated[Number, range_of(quantities.LONGEST_DELAY)]
 
     def acts(self, time_s: float) -> bool:
         """Whether it is there at a simulated time [s]."""

@@ -7,7 +7,24 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from rail_world.line.description_base import Chainage, Description, Name, Number, Speed
+from rail_msgs_py.quantities import (
+    DIRECTION,
+    FAULT_BEGIN,
+    FAULT_END,
+    SLIP_RATIO,
+    TRAIN_LENGTH,
+    TRAIN_START,
+    Direction,
+)
+from rail_world.line.description_base import (
+    Chainage,
+    Description,
+    Name,
+    Number,
+    Speed,
+    field_of,
+    range_of,
+)
 
 from .presets import PRESETS
 
@@ -40,7 +57,7 @@ class VehicleDescription(Description):
         ge=0.2, le=5.0, description="emergency braking on level track [m/s^2]"
     )
     max_speed_kmh: Speed = Field(description="design speed [km/h]")
-    length_m: Number = Field(ge=1.0, le=2000.0, description="length over couplers [m]")
+    length_m: Annotated[Number, range_of(TRAIN_LENGTH)]
 
     @model_validator(mode="before")
     @classmethod
@@ -110,16 +127,12 @@ class TrainDescription(Description):
     route: tuple[Name, ...] = Field(
         min_length=1, max_length=100, description="tracks in order of travel, joined by junctions"
     )
-    start_m: Chainage = Field(
-        default=0.0, description="chainage of the reference point on the first track [m]"
-    )
+    start_m: Number = field_of(TRAIN_START)
     depart_s: Number = Field(default=0.0, ge=0.0, le=1e6, description="time of departure [s]")
     speed_kmh: Number = Field(
         default=0.0, ge=0.0, le=600.0, description="speed at departure [km/h]"
     )
-    direction: Literal[1, -1] = Field(
-        default=1, description="+1 runs towards increasing chainage, -1 towards decreasing"
-    )
+    direction: Direction = field_of(DIRECTION)
     enters_at_departure: bool = Field(
         default=False, description="whether the train is not on the line before it departs"
     )
@@ -159,14 +172,14 @@ class TrainStop(Description):
     """A train that brakes to a stand by itself, from one time [s] to another."""
 
     train: str
-    from_s: float
-    to_s: float
+    from_s: Annotated[float, range_of(FAULT_BEGIN)]
+    to_s: Annotated[float, range_of(FAULT_END)]
 
 
 class WheelSlip(Description):
     """Wheels that turn `ratio` times as fast as the train runs, from one time [s] to another."""
 
     train: str
-    from_s: float
-    to_s: float
-    ratio: float = Field(ge=0.0, le=10.0)
+    from_s: Annotated[float, range_of(FAULT_BEGIN)]
+    to_s: Annotated[float, range_of(FAULT_END)]
+    ratio: Annotated[float, range_of(SLIP_RATIO)]

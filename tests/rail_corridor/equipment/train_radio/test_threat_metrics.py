@@ -71,7 +71,8 @@ def ride(
         )
         for n, at_m in STARTS_M.items()
     }
-    at_work = [ThreatPeriod(threats=tuple(threats), rate=rate, from_s=2.0)] if threats else []
+    fields = {"rate": rate, "from_s": 2.0, "to_s": 1e6, "longest_delay_s": 3.0}
+    at_work = [ThreatPeriod(threats=tuple(threats), **fields)] if threats else []
     net = Backbone(BASES, at_work, np.random.default_rng(3))
     made = recording()
     fields = attrgetter(*REPORTS.columns[1:])

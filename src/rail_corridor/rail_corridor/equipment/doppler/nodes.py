@@ -15,8 +15,6 @@ from rail_world.trains.description import TrainDescription
 from .placement import references_of
 from .section import REFERENCES, ReferencePlan
 
-#: Random walk that a positioner counts on of its own oscillator, after a second [Hz].
-WALK_HZ: Final = 0.5
 #: Points of the line that a positioner is given are this far apart [m].
 _LINE_STEP_M: Final = 5.0
 
@@ -50,7 +48,6 @@ def _positioner(plan: ReferencePlan, train: TrainDescription) -> dict[str, Any]:
         "track": train.route[0],
         "direction": train.direction,
         "start_m": train.start_m,
-        "walk_hz": WALK_HZ,
         "station_hz": 1e-9 * plan.station_ppb * plan.carrier_hz,
     }
 

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_corridor.scenario.model import Scenario
+from rail_msgs_py.doppler.quantities import RECEIVER_WALK
 from rail_signals.arrays import FloatArray
 from rail_signals.doppler.bound import position_bound_m, shift_information, tracked_bound_m
 from rail_signals.doppler.bound import shift_variance_hz2 as variance_of_shifts_hz2
 from rail_signals.doppler.surveyed_line import SurveyedLine
 from rail_world.doppler.medium import ReferenceMedium
 
-from .nodes import WALK_HZ
 from .placement import Reference, references_of
 from .section import REFERENCES, ReferencePlan
 from .world import reference_description
@@ -95,7 +95,7 @@ class ReferencedTrack:
             information,
             given,
             offset_sigma_hz=self._offset_hz,
-            walk_hz=WALK_HZ * step_s**0.5,
+            walk_hz=RECEIVER_WALK.default * step_s**0.5,
             speed_sigma_mps=self._speed_mps,
         )
 

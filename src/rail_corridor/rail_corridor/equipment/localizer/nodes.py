@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from rail_corridor.equipment.assumptions import PLACED_M, SIGMAS
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext
 from rail_corridor.scenario.model import Scenario
@@ -39,8 +38,6 @@ def _localizer(
         "track": train.route[0],
         "direction": train.direction,
         "start_m": train.start_m,
-        "placed_m": PLACED_M / SIGMAS,
-        "told_sigmas": SIGMAS,
         "odometer_scale": max(plan.odometer_error, wheels),
         "integrity_risk": plan.integrity_risk,
         "oldest_s": max(1.5, 6.0 * scenario.tick_s),

@@ -12,14 +12,13 @@ from rail_corridor.scenario.model import Section
 from rail_corridor.scenario.section_fields import (
     ChannelNumber,
     ChannelPair,
-    Frequency,
-    Gain,
-    Power,
     Whole,
 )
+from rail_msgs_py.ranging import quantities
+from rail_msgs_py.ranging.quantities import carrier_hz
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.ranging.signal import RangingSignal
-from rail_world.line.description_base import Chainage, Description, Name, Number
+from rail_world.line.description_base import Chainage, Description, Name, Number, field_of, range_of
 
 LONGEST_ZONE_M: Final = 2000.0
 SHORTEST_ZONE_M: Final = 20.0
@@ -91,22 +90,15 @@ class StationPlan(Description):
 class ChannelPlan(Description):
     """Pairs [downlink, uplink] that zones use in turn (Jeong et al., Figs 7 and 8)."""
 
-    main: tuple[ChannelPair, ...] = Field(
-        default=((1, 2), (3, 4)),
-        min_length=1,
-        max_length=20,
-        description="pairs in turn along a main track",
-    )
+    main: tuple[ChannelPair, ...] = field_of(quantities.MAIN_PAIRS, min_length=1, max_length=20)
     branch: tuple[ChannelPair, ...] = Field(
         default=((5, 6), (7, 8)),
         min_length=1,
         max_length=20,
         description="pairs in turn along a branch",
     )
-    first_carrier_hz: Number = Field(
-        default=2.4e9, ge=1e7, le=1e11, description="carrier of channel 1 [Hz]"
-    )
-    spacing_hz: Frequency = Field(default=5e6, description="distance of two carriers [Hz]")
+    first_carrier_hz: Number = field_of(quantities.FIRST_CARRIER)
+    spacing_hz: Number = field_of(quantities.CARRIER_SPACING)
 
     @model_validator(mode="after")
     def _each_once(self) -> ChannelPlan:
@@ -127,28 +119,23 @@ class ChannelPlan(Description):
     @property
     def carriers_hz(self) -> dict[int, float]:
         """Carrier frequency [Hz] of every channel of the plan."""
-        return {c: self.first_carrier_hz + (c - 1) * self.spacing_hz for c in self.numbers}
+        return {c: carrier_hz(c, self.first_carrier_hz, self.spacing_hz) for c in self.numbers}
 
 
 class RangingPlan(Description):
     """The ranging signal and how its phase is compared."""
 
-    tone_hz: Frequency = Field(default=375e3, description="ranging tone [Hz]")
-    deviation_hz: Frequency = Field(default=375e3, description="peak FM deviation [Hz]")
-    low_tone_hz: Frequency | None = Field(
+    tone_hz: Number = field_of(quantities.TONE)
+    deviation_hz: Number = field_of(quantities.DEVIATION)
+    low_tone_hz: Annotated[Number, range_of(quantities.TONE)] | None = Field(
         default=None, description="two_tone: tone that resolves the cycle of the other [Hz]"
     )
-    low_deviation_hz: Frequency | None = Field(
+    low_deviation_hz: Annotated[Number, range_of(quantities.DEVIATION)] | None = Field(
         default=None, description="two_tone: its peak FM deviation [Hz]; null = low_tone_hz"
     )
-    sample_rate_hz: Frequency = Field(default=4e6, description="complex sample rate [Hz]")
-    samples: Whole = Field(
-        default=960, ge=8, le=32_768, description="samples of a burst: whole periods of the tones"
-    )
-    comparator: Literal["quadrature", "and", "two_tone"] = Field(
-        default="quadrature",
-        description="and: 0...180 degrees, as in the paper; quadrature: 0...360 degrees",
-    )
+    sample_rate_hz: Number = field_of(quantities.SAMPLE_RATE)
+    samples: Whole = field_of(quantities.SAMPLES)
+    comparator: quantities.Comparator = field_of(quantities.COMPARATOR)
 
     @model_validator(mode="after")
     def _makes_a_signal(self) -> RangingPlan:
@@ -189,38 +176,28 @@ class RangingPlan(Description):
 class RadioPlan(Description):
     """Powers, antennas, noise and propagation."""
 
-    wrs_power_dbm: Power = Field(default=-10.0, description="transmit power of a station [dBm]")
-    vrs_power_dbm: Power = Field(default=-10.0, description="transmit power of a train [dBm]")
-    noise_figure_db: Number = Field(default=8.0, ge=0.0, le=30.0, description="receivers [dB]")
-    path_loss_exponent: Number = Field(
-        default=2.0, ge=1.5, le=6.0, description="2 = free space; counts from 1 m"
-    )
+    wrs_power_dbm: Number = field_of(quantities.WRS_POWER)
+    vrs_power_dbm: Number = field_of(quantities.VRS_POWER)
+    noise_figure_db: Number = field_of(quantities.NOISE_FIGURE)
+    path_loss_exponent: Number = field_of(quantities.PATH_LOSS_EXPONENT)
     reach_zones: Number = Field(
         default=2.0,
         ge=1.0,
         le=10.0,
         description="nothing is heard beyond this many zone lengths (Jeong et al., 2.5: two)",
     )
-    wrs_gain_dbi: Gain = Field(default=12.0, description="station antenna on its axis [dBi]")
-    wrs_beamwidth_deg: Number = Field(
-        default=60.0, ge=5.0, le=180.0, description="station antenna, between -3 dB points [deg]"
-    )
-    vrs_gain_dbi: Gain = Field(default=6.0, description="train antenna on its axis [dBi]")
-    vrs_beamwidth_deg: Number = Field(
-        default=60.0, ge=5.0, le=180.0, description="train antenna, between -3 dB points [deg]"
-    )
-    front_to_back_db: Number = Field(
-        default=30.0, ge=0.0, le=60.0, description="antennas, axis to back [dB]"
-    )
-    oscillator_ppm: Number = Field(
-        default=0.1, ge=0.0, le=1.0, description="standard deviation of each oscillator [ppm]"
-    )
+    wrs_gain_dbi: Number = field_of(quantities.WRS_GAIN)
+    wrs_beamwidth_deg: Number = field_of(quantities.WRS_BEAMWIDTH)
+    vrs_gain_dbi: Number = field_of(quantities.VRS_GAIN)
+    vrs_beamwidth_deg: Number = field_of(quantities.VRS_BEAMWIDTH)
+    front_to_back_db: Number = field_of(quantities.FRONT_TO_BACK)
+    oscillator_ppm: Number = field_of(quantities.OSCILLATOR)
 
 
 class TransponderPlan(Description):
     """The delay of the transponders on board, and how well the bench knows it."""
 
-    delay_s: Number = Field(default=1e-6, ge=0.0, le=1e-4, description="nominal delay [s]")
+    delay_s: Number = field_of(quantities.TRANSPONDER_DELAY)
     spread_s: Number = Field(
         default=5e-9,
         ge=0.0,
@@ -244,7 +221,7 @@ class Jam(TimedFault):
 
     kind: Literal["jam"]
     channel: ChannelNumber = Field(description="channel it jams")
-    power_dbm: Power = Field(default=0.0, description="its power [dBm]")
+    power_dbm: Number = field_of(quantities.JAMMER_POWER)
     track: Name = Field(description="track it stands at")
     at_m: Chainage = Field(description="chainage it stands at [m]")
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from rail_corridor.equipment.assumptions import SIGMAS
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext
 from rail_corridor.scenario.model import Scenario
+from rail_msgs_py.quantities import CLAIM_SIGMAS
+from rail_msgs_py.track_code.quantities import PROFILE
 
 from .placement import Circuit, circuits_of
-from .section import PROFILE, TRACK_CIRCUITS, TrackCircuitPlan
+from .section import TRACK_CIRCUITS, TrackCircuitPlan
 
 
 def code_nodes(scenario: Scenario, context: PlanContext) -> list[NodeSpec]:
@@ -26,13 +27,13 @@ def code_nodes(scenario: Scenario, context: PlanContext) -> list[NodeSpec]:
     for described in scenario.trains:
         train = described.name
         receiver = {
-            "profile": PROFILE,
+            "profile": PROFILE.default,
             "carriers_hz": plan.carriers_hz,
             "sample_rate_hz": plan.sample_rate_hz,
         }
         supervision = {
             "braking_mps2": plan.braking_mps2,
-            "odometer_error": SIGMAS * plan.odometer_error,
+            "odometer_error": CLAIM_SIGMAS.default * plan.odometer_error,
             "direction": described.direction,
             "timeout_s": 3 * timeout_s / 5,
             **context.offers("code_supervision", scenario, train),
@@ -50,7 +51,7 @@ def _transmitter(
     ahead = circuits_ahead(scenario, plan, circuit)
     row = [circuit, *ahead]
     return {
-        "profile": PROFILE,
+        "profile": PROFILE.default,
         "carrier_hz": circuit.carrier_hz,
         "sample_rate_hz": plan.sample_rate_hz,
         "tick_s": scenario.tick_s,

@@ -8,9 +8,12 @@ from pydantic import Field, model_validator
 
 from rail_corridor.scenario.faults import Fault
 from rail_corridor.scenario.model import Section
-from rail_corridor.scenario.section_fields import Frequency, Time, Whole
+from rail_corridor.scenario.section_fields import Whole
+from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
+from rail_msgs_py.quantity import NEEDED
+from rail_msgs_py.train_bus import quantities
 from rail_signals.train_bus.frame import BusFrameFormat
-from rail_world.line.description_base import Description, Name, Number
+from rail_world.line.description_base import Description, Name, Number, field_of, range_of
 from rail_world.train_bus.description import FaultKind
 
 #: Size of each kind where none is given; open and wrong_cable have none.
@@ -36,39 +39,20 @@ _NEEDS: Final[dict[str, str]] = {
 class BusPlan(Description):
     """The train bus: its cable in each car, its frames, and the reflectometer that watches it."""
 
-    cars: tuple[str, ...] = Field(
-        default=("CM2", "CM3", "CM4", "CM3", "CM2"),
-        min_length=1,
-        max_length=40,
-        description="profile of the cable in each car, from the head",
-    )
+    cars: tuple[str, ...] = field_of(quantities.CARS, min_length=1, max_length=40)
     trains: tuple[Name, ...] = Field(
         default=(), max_length=100, description="trains that have the bus; empty = all"
     )
-    bit_rate_hz: Frequency = Field(default=1e6, description="bits per second")
-    samples_per_bit: Whole = Field(default=8, ge=4, le=64, description="an even number")
-    rise_time_s: Number = Field(
-        default=150e-9, ge=0.0, le=1e-3, description="of the drivers' edges, 10 to 90 % [s]"
-    )
-    level_v: Number = Field(
-        default=4.0, gt=0.0, le=100.0, description="amplitude of the drivers, matched line [V]"
-    )
-    noise_v: Number = Field(
-        default=0.25, ge=0.0, le=100.0, description="rms of a sample at the receivers [V]"
-    )
-    answer_timeout_s: Number = Field(
-        default=2.0, ge=0.1, le=60.0, description="end of train not confirmed after this time [s]"
-    )
-    period_s: Number = Field(
-        default=30.0, ge=0.1, le=1e5, description="from one measurement to the next [s]"
-    )
-    traces: Whole = Field(default=8, ge=1, le=64, description="traces of a measurement")
-    reflectometer_rise_s: Number = Field(
-        default=20e-9, gt=0.0, le=1e-6, description="rise time of the reflectometer [s]"
-    )
-    reflectometer_noise: Number = Field(
-        default=1e-3, gt=0.0, le=0.1, description="rms of a sample of a trace, as a reflection"
-    )
+    bit_rate_hz: Number = field_of(quantities.BIT_RATE)
+    samples_per_bit: Whole = field_of(quantities.SAMPLES_PER_BIT)
+    rise_time_s: Number = field_of(quantities.RISE_TIME)
+    level_v: Number = field_of(quantities.LEVEL)
+    noise_v: Number = field_of(quantities.NOISE)
+    answer_timeout_s: Number = field_of(quantities.ANSWER_TIMEOUT)
+    period_s: Number = field_of(quantities.PERIOD)
+    traces: Whole = field_of(quantities.TRACES)
+    reflectometer_rise_s: Number = field_of(quantities.REFLECTOMETER_RISE)
+    reflectometer_noise: Number = field_of(quantities.REFLECTOMETER_NOISE)
 
     @model_validator(mode="after")
     def _makes_frames(self) -> BusPlan:
@@ -91,40 +75,28 @@ class BusFault(Fault):
     kind: Literal["bus_fault"]
     train: Name = Field(description="the train")
     fault: FaultKind = Field(description="what it is; open and wrong_cable do not grow")
-    from_s: Time = Field(default=0.0, description="begin [s]")
-    to_s: Time = Field(description="it is as large as it gets [s]")
+    from_s: Number = field_of(FAULT_BEGIN)
+    to_s: Number = field_of(FAULT_END.but(default=NEEDED, text="it is as large as it gets"))
     law: Literal["linear", "exponential"] = Field(default="exponential", description="of growth")
-    size: Annotated[Number, Field(gt=0.0, le=1e6)] | None = Field(
+    size: Annotated[Number, range_of(quantities.FAULT_SIZE)] | None = Field(
         default=None,
         description="when it has grown: resistance of loose_connector and bad_splice, and what is"
         " left of it in a short [ohm]; rise of the capacitance (water_ingress), of impedance and"
         " loss (missing_shield_ground) as a share; null = 3000, 3000, 1, 0.6, 0.2",
     )
-    at_m: Annotated[Number, Field(ge=0.0, le=1e4)] | None = Field(
-        default=None, description="place along the cable from the head, where it is in a run [m]"
+    at_m: Annotated[Number, range_of(quantities.FAULT_PLACE)] | None = Field(
+        default=None, description=quantities.FAULT_PLACE.description
     )
-    car: Annotated[Whole, Field(ge=1, le=100)] | None = Field(
-        default=None, description="car of wrong_cable, missing_shield_ground; the head's is 1"
+    car: Annotated[Whole, range_of(quantities.FAULT_CAR)] | None = Field(
+        default=None, description=quantities.FAULT_CAR.description
     )
-    coupler: Annotated[Whole, Field(ge=1, le=100)] | None = Field(
-        default=None, description="coupler of loose_connector; 1 is behind the head's car"
+    coupler: Annotated[Whole, range_of(quantities.FAULT_COUPLER)] | None = Field(
+        default=None, description=quantities.FAULT_COUPLER.description
     )
-    length_m: Number = Field(
-        default=5.0, gt=0.0, le=1e3, description="water_ingress: length that is wet [m]"
-    )
-    conductance_us_per_m: Number = Field(
-        default=10.0, ge=0.0, le=1e3, description="water_ingress: of the wet insulation [uS/m]"
-    )
-    spread: Number = Field(
-        default=0.2,
-        ge=0.0,
-        le=1.0,
-        description="loose_connector: standard deviation of the logarithm of its resistance from"
-        " one moment to the next",
-    )
-    noise_factor: Number = Field(
-        default=3.0, ge=1.0, le=100.0, description="missing_shield_ground: on the noise"
-    )
+    length_m: Number = field_of(quantities.WET_LENGTH)
+    conductance_us_per_m: Number = field_of(quantities.WET_CONDUCTANCE)
+    spread: Number = field_of(quantities.CONTACT_SPREAD)
+    noise_factor: Number = field_of(quantities.NOISE_FACTOR)
     cable: str = Field(
         default="polyethylene", max_length=40, description="wrong_cable: profile of what is there"
     )

@@ -6,10 +6,10 @@ import hashlib
 from itertools import pairwise
 from typing import Any, Final
 
-from rail_corridor.equipment.assumptions import PLACED_M, SIGMAS
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext
 from rail_corridor.scenario.model import Scenario
+from rail_msgs_py.quantities import CLAIM_SIGMAS
 from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.train_radio.burst import RadioBurstFormat
@@ -114,13 +114,12 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
         "number": number,
         "segment": list(scenario.network.tracks).index(train.route[0]),
         "start_m": train.start_m,
-        "placed_m": PLACED_M,
         "length_m": train.vehicle.length_m,
         "steepest_fall_permil": steepest_fall_permil(track),
         "braking_mps2": plan.braking_mps2,
         "emergency_mps2": plan.emergency_mps2,
         "traction_mps2": Vehicle(train.vehicle).traction_mps2(0.0),
-        "odometer_error": SIGMAS * plan.odometer_error,
+        "odometer_error": CLAIM_SIGMAS.default * plan.odometer_error,
         "authority_timeout_s": plan.timeout_s,
         "secret": secret(scenario),
         "seed": scenario.seed,
@@ -162,10 +161,8 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
             tracks[train.route[0]].length_m if train.leaves_on_arrival else 0.0
             for train in by_departure
         ),
-        "placed_m": PLACED_M,
         "margin_m": plan.margin_m,
         "validity_s": plan.timeout_s,
-        "fix_sigmas": SIGMAS,
         "secret": secret(scenario),
         "seed": scenario.seed,
         "tick_s": scenario.tick_s,

@@ -1,0 +1,1 @@
+"""One position on board from all sensors."""

@@ -1,0 +1,1 @@
+"""Track codes: FM messages in the rails."""

@@ -1,0 +1,1 @@
+"""The train bus and its reflectometer."""

@@ -37,8 +37,9 @@ def _text(view: Any) -> str:
         return _waveform(view)
     if isinstance(view, Table):
         return _table(view)
-    words = view.describe() if hasattr(view, "describe") else repr(view)
-    return f"{_time(view.stamp_ns)}  {words}"
+    if hasattr(view, "describe"):
+        return f"{_time(view.stamp_ns)}  {view.describe()}"
+    return str(view)
 
 
 def _time(stamp_ns: int) -> str:

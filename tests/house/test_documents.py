@@ -1,7 +1,8 @@
-"""Documents: links lead somewhere, generated parts can go stale and are noticed."""
+"""Documents: links and names lead somewhere, generated parts can go stale and are noticed."""
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 from pathlib import Path
@@ -11,6 +12,12 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
+DOTTED = re.compile(
+    r"(?<![\w./-])rail_(?:signals|msgs_py|world|wayside|onboard|corridor)(?:\.\w+)+"
+)
+TEST_FILE = re.compile(r"(?:\w+/)*test_\w+\.py")
+#: Names of records in a recording, which look like modules.
+RECORDS = {"rail_corridor.begin", "rail_corridor.end"}
 
 
 def load_refresh() -> ModuleType:
@@ -33,6 +40,73 @@ def test_links_within_the_project_lead_somewhere(path: Path) -> None:
         if not re.match(r"[a-z]+:", target) and not (path.parent / target).exists()
     ]
     assert broken == []
+
+
+def names_in(body: list[ast.stmt]) -> dict[str, list[ast.stmt]]:
+    """Names that statements define, each with the body of its class."""
+    names: dict[str, list[ast.stmt]] = {}
+    for node in body:
+        if isinstance(node, ast.ClassDef):
+            names[node.name] = node.body
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            names[node.name] = []
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names |= {target.id: [] for target in targets if isinstance(target, ast.Name)}
+    return names
+
+
+def leads_somewhere(dotted: str, root: Path = ROOT) -> bool:
+    """Whether a dotted name is that of a package, a module, or of what one defines."""
+    package, *rest = dotted.split(".")
+    place = root / "src" / package / package
+    while rest and (place / rest[0]).is_dir():
+        place /= rest.pop(0)
+    if not rest:
+        return (place / "__init__.py").exists()
+    if (module := place / f"{rest[0]}.py").exists():
+        rest.pop(0)
+    elif not (module := place / "__init__.py").exists():
+        return False
+    body = ast.parse(module.read_text(encoding="utf-8")).body
+    for name in rest:
+        names = names_in(body)
+        if name not in names:
+            return False
+        body = names[name]
+    return True
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: str(p.relative_to(ROOT)))
+def test_names_of_modules_and_tests_lead_somewhere(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    dotted = {name for name in DOTTED.findall(text) if name not in RECORDS}
+    assert [name for name in sorted(dotted) if not leads_somewhere(name)] == []
+    known = [test.relative_to(ROOT).as_posix() for test in (ROOT / "tests").rglob("test_*.py")]
+    tests = sorted(set(TEST_FILE.findall(text)))
+    assert [t for t in tests if not any(f"/{k}".endswith(f"/{t}") for k in known)] == []
+
+
+@pytest.mark.parametrize(
+    ("dotted", "expected"),
+    [
+        ("rail_pkg.folder", True),
+        ("rail_pkg.folder.module", True),
+        ("rail_pkg.folder.module.Thing.method", True),
+        ("rail_pkg.folder.module.CONSTANT", True),
+        ("rail_pkg.folder.other", False),
+        ("rail_pkg.folder.module.Thing.gone", False),
+        ("rail_pkg.folder.module.Gone", False),
+    ],
+)
+def test_a_name_that_leads_nowhere_is_noticed(tmp_path: Path, dotted: str, expected: bool) -> None:
+    folder = tmp_path / "src" / "rail_pkg" / "rail_pkg" / "folder"
+    folder.mkdir(parents=True)
+    (folder / "__init__.py").touch()
+    (folder.parent / "__init__.py").touch()
+    source = "CONSTANT = 1\n\nclass Thing:\n    def method(self):\n        return 1\n"
+    (folder / "module.py").write_text(source, encoding="utf-8")
+    assert leads_somewhere(dotted, tmp_path) == expected
 
 
 def test_the_index_names_every_document() -> None:

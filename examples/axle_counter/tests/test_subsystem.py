@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import runpy
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -166,3 +167,15 @@ def test_a_sensor_on_the_points_of_a_junction_is_refused(
     with pytest.raises(InputError, match="on the points") as refused:
         scenario(**changes)
     assert refused.value.field == "axle_counters.length_m"
+
+
+@pytest.mark.filterwarnings("ignore:.*found in sys.modules:RuntimeWarning")
+@pytest.mark.parametrize("kind", AXLE_COUNTER.nodes, ids=lambda kind: kind.name)
+def test_every_node_starts_as_a_module(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[str] = []
+    monkeypatch.setattr(
+        "rail_msgs_py.tick_node.run_node", lambda node: started.append(node.__name__)
+    )
+    module, _, name = kind.target.partition(":")
+    runpy.run_module(module, run_name="__main__")
+    assert started == [name]

@@ -40,7 +40,10 @@ class _Entry:
 
 def ask_anew() -> None:
     """Forget what entry points were found before."""
-    for each in (registry.subsystems, registry.node_kinds, registry.topics):
+    for each in (
+        *(registry.subsystems, registry.node_kinds, registry.topics),
+        registry.live_views,
+    ):
         each.cache_clear()
 
 
@@ -163,6 +166,8 @@ def test_who_reads_the_truth_says_so_by_itself(install: Install) -> None:
 class _View:
     """A view that the corridor does not know."""
 
+    stamp_ns = 1_500_000_000
+
     def __init__(self, text: str) -> None:
         self._text = text
 
@@ -172,11 +177,11 @@ class _View:
             raise ValueError("empty")
         return cls(message.data)
 
-    def __str__(self) -> str:
+    def describe(self) -> str:
         return f"said {self._text}"
 
 
 def test_a_view_of_another_distribution_is_shown_as_it_says(install: Install) -> None:
     install(topics=(topic("/extra", _View),))
-    assert decoded.decode("/extra", String(data="hello")) == "said hello"
+    assert decoded.decode("/extra", String(data="hello")).strip() == "1.500 s  said hello"
     assert decoded.decode("/extra", String()).startswith("(empty)\n")

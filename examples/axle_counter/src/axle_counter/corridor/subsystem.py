@@ -18,6 +18,7 @@ from rail_msgs_py.topics.world import STATE
 from rail_world.line.description_base import Description
 
 from .checks import check_axle_counters
+from .live import AxleCounterView
 from .nodes import axle_counter_nodes, sensors_of
 from .placement import layout_of
 from .report import axle_counter_metrics, axle_counter_tables
@@ -99,6 +100,10 @@ class AxleCounter(Subsystem):
     def tables(self, report: Mapping[str, Any]) -> Iterable[RenderableType]:
         """See `Subsystem.tables`."""
         return axle_counter_tables(report)
+
+    def live(self) -> AxleCounterView:
+        """See `Subsystem.live`."""
+        return AxleCounterView()
 
 
 AXLE_COUNTER: Final = AxleCounter()

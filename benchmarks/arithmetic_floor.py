@@ -9,11 +9,11 @@ import numpy as np
 from rail_corridor.plan.plan import Plan
 from rail_corridor.scenario.model import Scenario
 from rail_onboard.ranging.channel_selector import ChannelSelector
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import modulate
 from rail_signals.ranging.transponder import reply_lag_rad
 from rail_wayside.ranging.ranging_station import RangingStation
-from rail_wayside.ranging.train_tracker import Reading, ZoneTracker
+from rail_wayside.ranging.train_tracker import ZoneReading, ZoneTracker
 from rail_wayside.zone_controller_node import ZoneControllerParameters, zone_map_of
 from rail_world.ranging.description import RadioDescription
 from rail_world.ranging.medium import RadioMedium
@@ -28,7 +28,7 @@ def arithmetic_ms(scenario: Scenario, plan: Plan, ticks: int) -> float:
     radio = world.part("ranging", RadioDescription)
     medium = RadioMedium(radio, world.seed)
     signal = scenario.ranging.signal
-    receiver = LineReceiver(signal)
+    receiver = FmToneReceiver(signal)
     station = RangingStation(signal, scenario.ranging.comparator, scenario.transponder.delay_s)
     pairs = {a.downlink_channel: a.uplink_channel for a in radio.stations}
     selectors = [ChannelSelector(pairs) for _ in world.trains]
@@ -59,9 +59,9 @@ def arithmetic_ms(scenario: Scenario, plan: Plan, ticks: int) -> float:
                 lag = reply_lag_rad(found.phase_lag_rad[rows[channel]], signal, 1e-6)
                 replies[train] = (pairs[channel], modulate(signal, lag) * 0.3)
         returned = medium.uplink(tick, time_s, paths, replies)
-        readings = {a.zone: Reading(np.inf, np.inf) for a in radio.stations}
+        readings = {a.zone: ZoneReading(np.inf, np.inf) for a in radio.stations}
         for (index, _), reception in returned.items():
             reading = station.read(reception.samples)
-            readings[radio.stations[index].zone] = Reading(reading.range_m, reading.variance_m2)
+            readings[radio.stations[index].zone] = ZoneReading(reading.range_m, reading.variance_m2)
         tracker.update(time_s, readings)
     return (time.perf_counter() - begin) / ticks * 1e3

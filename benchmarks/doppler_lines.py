@@ -44,7 +44,7 @@ from rail_msgs_py.topics.world import STATE
 from rail_onboard.doppler.positioner import DopplerPositioner
 from rail_onboard.doppler.positioner_node import DopplerPositionerParameters, positioner_of
 from rail_signals.doppler.signal import reference_tone
-from rail_signals.doppler.solver import Reason
+from rail_signals.doppler.solver import NoFixReason
 from rail_world.doppler.medium import ReferenceMedium
 from rail_world.trains.traffic import Traffic
 
@@ -101,7 +101,7 @@ def follow(scenario: Scenario, every: int) -> Run:
         answer = positioner.locate(block, time_s - last_s)
         cpu_s += time.process_time() - begin
         last_s = time_s
-        fix = answer.fix if answer.reason is Reason.NONE else None
+        fix = answer.fix if answer.reason is NoFixReason.NONE else None
         found = (np.nan, np.nan) if fix is None else (fix.chainage_m, fix.sigma_m)
         rows.append(
             (state[0, STATE.index["chainage_m"]], state[0, STATE.index["speed_mps"]], *found)

@@ -35,7 +35,7 @@ from scipy import optimize
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.doppler.bound import shift_variance_hz2
-from rail_signals.doppler.solver import DopplerSolver, Prior, Reason
+from rail_signals.doppler.solver import DopplerSolver, NoFixReason, Prior
 from rail_signals.doppler.surveyed_line import SurveyedLine
 from rail_signals.doppler.tone_plan import TonePlan
 from rail_world.line.alignment import Alignment, Element
@@ -127,7 +127,7 @@ def draws(
         direction = int(np.sign(v)) if case.direction else 0
         draw = Draw(heard, shift, variance, prior, near, direction, s, v)
         answer = _solve(solver, draw)
-        if answer.reason is not Reason.NONE:
+        if answer.reason is not NoFixReason.NONE:
             continue
         fix = answer.fix
         if abs(fix.chainage_m - s) > 6 * fix.sigma_m:

@@ -35,7 +35,7 @@ from rail_signals.localizer.localizer import Localizer
 from rail_signals.localizer.readings import (
     DopplerFix,
     RangeFix,
-    TickReadings,
+    TickMeasurements,
     WheelSpeed,
 )
 from rail_signals.localizer.settings import LocalizerSettings, Sensor
@@ -199,7 +199,7 @@ def cost(ticks: int = 3000) -> dict[str, float]:
         one, two = rng.standard_normal((2, 7, 11))
         for tick, noise in enumerate(rng.standard_normal((ticks, 4)).tolist()):
             s = speed_mps * 0.1 * tick
-            readings = TickReadings(
+            readings = TickMeasurements(
                 RangeFix(s + 0.2 * noise[0], 0.04, 0.0, s // 1500.0),
                 DopplerFix(s + 3.0 * noise[1], speed_mps + 0.3 * noise[2], 9.0, 0.5, 0.09, 0.0)
                 if with_doppler

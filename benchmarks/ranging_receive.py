@@ -29,7 +29,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from rail_signals.ranging.bounds import tone_phase_variance_bound
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import RangingSignal, modulate
 
 PEER = Path(__file__).parent / "peers" / "gnuradio_ranging.py"
@@ -46,8 +46,8 @@ def rows() -> list[dict[str, Any]]:
     lag, bursts = _bursts(rng, signal, BURSTS)
     bound_rad = math.sqrt(float(tone_phase_variance_bound(SNR, signal.samples, 1.0)))
     python = _peer_python()
-    usual = LineReceiver(signal, max_offset_hz=1e3)
-    wide = LineReceiver(signal, max_offset_hz=5e3)
+    usual = FmToneReceiver(signal, max_offset_hz=1e3)
+    wide = FmToneReceiver(signal, max_offset_hz=5e3)
     double = bursts.astype(np.complex128)
     cases = (
         ("ranging.receive", usual, bursts),
@@ -103,7 +103,7 @@ def _bursts(
     return lag[:, 0], bursts.astype(np.complex64)
 
 
-def _rate(receiver: LineReceiver, bursts: np.ndarray) -> tuple[float, np.ndarray]:
+def _rate(receiver: FmToneReceiver, bursts: np.ndarray) -> tuple[float, np.ndarray]:
     """Bursts per CPU-second, best of the passes, and the lags found."""
     cpu_s = []
     for _ in range(PASSES):
@@ -118,7 +118,7 @@ def _rate(receiver: LineReceiver, bursts: np.ndarray) -> tuple[float, np.ndarray
 def _single_rate(rng: np.random.Generator) -> float:
     """Count calls per CPU-second for one burst of 960 samples, as a station makes each tick."""
     signal = RangingSignal()
-    receiver = LineReceiver(signal)
+    receiver = FmToneReceiver(signal)
     burst = _bursts(rng, signal, 1)[1][0].astype(np.complex128)
     rates = []
     for _ in range(ROUNDS):

@@ -7,7 +7,7 @@ words sent. Peers do the least that suffices: mixer, low-pass, discriminator, lo
 64 Hz, amplitudes of the tones in a sliding slot by least squares, a threshold. The receiver
 also looks for faults of the input, rejects DC, weighs with the noise's spectrum, checks
 windows, noise, CRC and confirmation, and watches for a change of the word; each of its
-decisions is compared with that of `TrackCodeReceiver` before anything is timed. GNU Radio
+decisions is compared with that of `ReferenceTrackCodeReceiver` before anything is timed. GNU Radio
 runs twice: alone, which is the peer, and as front end of one NumPy product, which is told.
 
 CPU time of one process is counted; matrix products use one thread. Each round takes the middle
@@ -37,8 +37,8 @@ from scipy import signal
 
 from rail_signals.track_code.decision import Decision
 from rail_signals.track_code.profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
-from rail_signals.track_code.receiver import FastTrackCodeReceiver
-from rail_signals.track_code.reference_receiver import TrackCodeReceiver
+from rail_signals.track_code.receiver import TrackCodeReceiver
+from rail_signals.track_code.reference_receiver import ReferenceTrackCodeReceiver
 from rail_signals.track_code.signal import FmTransmitter
 from rail_signals.track_code.tone_levels import tone_estimator
 from rail_signals.track_code.word import encode
@@ -176,12 +176,12 @@ def _receive(case: Case) -> list[Decision]:
     return receiver.feed(case.samples)
 
 
-_RECEIVERS: dict[float, FastTrackCodeReceiver] = {}
+_RECEIVERS: dict[float, TrackCodeReceiver] = {}
 
 
-def _receiver(case: Case) -> FastTrackCodeReceiver:
+def _receiver(case: Case) -> TrackCodeReceiver:
     if case.rate_hz not in _RECEIVERS:
-        _RECEIVERS[case.rate_hz] = FastTrackCodeReceiver(
+        _RECEIVERS[case.rate_hz] = TrackCodeReceiver(
             case.profile, CARRIER_HZ, case.rate_hz, hop_samples=HOP
         )
     return _RECEIVERS[case.rate_hz]
@@ -190,7 +190,7 @@ def _receiver(case: Case) -> FastTrackCodeReceiver:
 def _compare(case: Case) -> None:
     """Every decision of the fast receiver is that of the document's chain, and right."""
     fast = _receive(case)
-    chain = TrackCodeReceiver(case.profile, CARRIER_HZ, case.rate_hz, hop_samples=HOP)
+    chain = ReferenceTrackCodeReceiver(case.profile, CARRIER_HZ, case.rate_hz, hop_samples=HOP)
     slow = chain.feed(case.samples)
     same = len(fast) == len(slow) and all(
         np.array_equal(a.bits, b.bits) and a.valid == b.valid and a.fields == b.fields

@@ -18,7 +18,7 @@ chain lost  the same with all its rules: windows, noise, CRC, two slots; lost is
 
 The chain is simulated at its own discriminator rate, 640 Hz, where its band-pass is the
 impulse response that the band-pass and the analytic filter have there. A check compares
-this with `TrackCodeReceiver` fed at 16 kHz. Also counted: messages that noise alone makes,
+this with `ReferenceTrackCodeReceiver` fed at 16 kHz. Also counted: messages that noise alone makes,
 and wrong messages taken for true at the density at which half are lost.
 """
 
@@ -53,7 +53,10 @@ from rail_signals.track_code.filters import DEMODULATED_RATE_HZ, dc_rejecter, re
 from rail_signals.track_code.ml import MaximumLikelihoodTones
 from rail_signals.track_code.ml_tracker import TrackedTones
 from rail_signals.track_code.profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
-from rail_signals.track_code.reference_receiver import TrackCodeReceiver, receiver_estimator
+from rail_signals.track_code.reference_receiver import (
+    ReferenceTrackCodeReceiver,
+    receiver_estimator,
+)
 from rail_signals.track_code.signal import FmTransmitter
 from rail_signals.track_code.word import crc
 
@@ -362,7 +365,7 @@ class Study:
             sender = FmTransmitter(low.profile, CARRIER_HZ, RATE_HZ, phases.tolist())
             wave = sender.block(word, round(low.hops * HOP * RATE_HZ / SLOT_RATE_HZ))
             wave += rng.normal(scale=scale, size=wave.size)
-            receiver = TrackCodeReceiver(low.profile, CARRIER_HZ, RATE_HZ, hop_samples=HOP)
+            receiver = ReferenceTrackCodeReceiver(low.profile, CARRIER_HZ, RATE_HZ, hop_samples=HOP)
             last = receiver.feed(wave)[-1]
             lost += not (last.valid and np.array_equal(last.bits, word))
             square += float(np.mean((last.levels - word) ** 2))
@@ -498,9 +501,9 @@ def main() -> None:
     if options.threshold:
         threshold(options.quick)
         return
-    figures = measure(options.quick)
+    values = measure(options.quick)
     if options.json:
-        options.json.write_text(json.dumps(figures, indent=2) + "\n")
+        options.json.write_text(json.dumps(values, indent=2) + "\n")
 
 
 if __name__ == "__main__":

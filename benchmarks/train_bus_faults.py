@@ -34,7 +34,14 @@ from scipy import stats
 
 from rail_signals.train_bus.consist import COMMON
 from rail_signals.train_bus.faults import KINDS
-from rail_signals.train_bus.study.campaign import HEALTHY, TRACES, Case, Outcome, draw_case, examine
+from rail_signals.train_bus.study.campaign import (
+    HEALTHY,
+    TRACES,
+    Case,
+    CaseResult,
+    draw_case,
+    examine,
+)
 from rail_signals.train_bus.study.detection_limits import detectable_size, fault_of_size
 
 CURVE_SNR_DB = (40.0, 50.0, 60.0, 70.0)
@@ -121,7 +128,7 @@ def _print_rows(rows: dict[str, Any], seconds: dict[str, list[float]]) -> None:
         )
 
 
-def run_case(kind: str, seed: list[int], snr_db: float) -> tuple[Case, Outcome, float]:
+def run_case(kind: str, seed: list[int], snr_db: float) -> tuple[Case, CaseResult, float]:
     """Draw, measure and interpret one case; returns it with the CPU seconds of all that."""
     rng = np.random.default_rng(seed)
     case = draw_case(kind, rng, snr_db)
@@ -198,7 +205,7 @@ def _print_confusion(counts: dict[str, dict[str, int]]) -> None:
         print(f"{kind:22} {cells}")
 
 
-def _tell(number: int, case: Case, outcome: Outcome) -> None:
+def _tell(number: int, case: Case, outcome: CaseResult) -> None:
     """One line about a case that went wrong."""
     finding = outcome.interpretation.finding
     what = "nothing" if finding is None else f"{finding.kind} at {finding.place_m:.1f} m"

@@ -32,9 +32,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from numpy.typing import NDArray
 
+from rail_signals.train_bus.bus_line import BusLine, CableSection, Termination
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.cascade import input_reflection
-from rail_signals.train_bus.line import Line, Section, Termination
 
 Trace = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
@@ -48,20 +48,20 @@ ROUNDS = 9
 PASSES = {"ours": 20, "ABCD": 5, "idiom": 1}
 
 
-def the_line() -> Line:
+def the_line() -> BusLine:
     """Sections that all reflect, by a few per cent each."""
     rng = np.random.default_rng(1)
     factors, lengths = rng.uniform(0.85, 1.15, SECTIONS), rng.uniform(10.0, 50.0, SECTIONS)
     parts = tuple(
-        Section(CABLE, float(length), float(factor))
+        CableSection(CABLE, float(length), float(factor))
         for length, factor in zip(lengths, factors, strict=True)
     )
-    return Line(parts, Termination(100.0))
+    return BusLine(parts, Termination(100.0))
 
 
-def ours(line: Line) -> Trace:
+def ours(bus_line: BusLine) -> Trace:
     """The project's own way."""
-    reflection = input_reflection(line, FREQUENCY_HZ, REFERENCE_OHM)
+    reflection = input_reflection(bus_line, FREQUENCY_HZ, REFERENCE_OHM)
     impulse = np.fft.fftshift(np.fft.irfft(reflection, SAMPLES))
     step = np.cumsum(impulse)
     step -= impulse / 2  # by trapezia from the first sample, as scikit-rf has it
@@ -69,7 +69,7 @@ def ours(line: Line) -> Trace:
     return reflection, impulse, step
 
 
-def scikit_rf() -> dict[str, Callable[[Line], Trace]] | None:
+def scikit_rf() -> dict[str, Callable[[BusLine], Trace]] | None:
     """The ways of scikit-rf; None if it is not installed."""
     try:
         import skrf as rf
@@ -92,9 +92,9 @@ def scikit_rf() -> dict[str, Callable[[Line], Trace]] | None:
         wave = CABLE.wave_constants(2j * np.pi * FREQUENCY_HZ)
         return wave.propagation, wave.impedance
 
-    def from_abcd(line: Line) -> Trace:
+    def from_abcd(bus_line: BusLine) -> Trace:
         gamma, impedance = constants()
-        sections: list[Any] = list(line.elements)
+        sections: list[Any] = list(bus_line.elements)
         phase = gamma * np.array([s.length_m for s in sections])[:, None]
         z0 = impedance * np.array([s.impedance_factor for s in sections])[:, None]
         grown = np.exp(phase)
@@ -108,35 +108,35 @@ def scikit_rf() -> dict[str, Callable[[Line], Trace]] | None:
             c, d = c * diagonal + d * lower, c * upper + d * diagonal
         product = np.stack([a, b, c, d], axis=-1).reshape(-1, 2, 2)
         chain = rf.Network(frequency=axis, a=product, z0=REFERENCE_OHM)
-        return whole(chain, line.termination.resistance_ohm)
+        return whole(chain, bus_line.termination.resistance_ohm)
 
-    def idiom(line: Line) -> Trace:
+    def idiom(bus_line: BusLine) -> Trace:
         gamma, impedance = constants()
         chain = None
-        for section in line.elements:
-            assert isinstance(section, Section)
+        for section in bus_line.elements:
+            assert isinstance(section, CableSection)
             medium = DefinedGammaZ0(axis, gamma=gamma, z0=impedance * section.impedance_factor)
             part = medium.line(section.length_m, "m")
             part.renormalize(REFERENCE_OHM)
             chain = part if chain is None else chain**part
-        return whole(chain, line.termination.resistance_ohm)
+        return whole(chain, bus_line.termination.resistance_ohm)
 
     return {"ABCD": from_abcd, "idiom": idiom}
 
 
 def measure() -> dict[str, float]:
     """Milliseconds of CPU time of each side."""
-    line = the_line()
-    sides: dict[str, Callable[[Line], Trace]] = {"ours": ours, **(scikit_rf() or {})}
+    bus_line = the_line()
+    sides: dict[str, Callable[[BusLine], Trace]] = {"ours": ours, **(scikit_rf() or {})}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        mine = ours(line)
+        mine = ours(bus_line)
         for name, side in sides.items():
-            check(name, mine, side(line))
+            check(name, mine, side(bus_line))
         spent: dict[str, list[float]] = {name: [] for name in sides}
         for _ in range(ROUNDS):  # in turns, so that all see the same machine
             for name, side in sides.items():
-                spent[name].append(min(_once(side, line) for _ in range(PASSES[name])))
+                spent[name].append(min(_once(side, bus_line) for _ in range(PASSES[name])))
     return {name: 1e3 * statistics.median(times) for name, times in spent.items()}
 
 
@@ -164,9 +164,9 @@ def rows() -> Iterator[dict[str, Any]]:
     }
 
 
-def _once(side: Callable[[Line], Trace], line: Line) -> float:
+def _once(side: Callable[[BusLine], Trace], bus_line: BusLine) -> float:
     start = time.process_time()
-    side(line)
+    side(bus_line)
     return time.process_time() - start
 
 

@@ -12,7 +12,7 @@ from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.delay import fractional_delay
 from rail_signals.ranging.bounds import two_way_range_variance_bound
 from rail_signals.ranging.phase_range import phase_to_range_m, range_per_radian_m
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import RangingSignal, modulate
 from rail_signals.ranging.transponder import transpond
 
@@ -33,7 +33,7 @@ def receive(
 def main() -> None:
     """Range a train at several distances."""
     signal, rng = RangingSignal(), np.random.default_rng(1)
-    receiver = LineReceiver(signal)
+    receiver = FmToneReceiver(signal)
     tone_hz = signal.tones_hz[0]
     bound_m = np.sqrt(
         two_way_range_variance_bound(SNR, SNR, signal.samples, signal.indices[0], tone_hz)

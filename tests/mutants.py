@@ -135,7 +135,7 @@ MUTANTS: list[Mutant] = [
         f"{_REPORTS}/ranging/test_verdicts.py",
         (
             "wrong_track_ticks is 0",
-            'wrong_track_ticks": int(np.count_nonzero(found.wrong_track))',
+            'wrong_track_ticks": int(np.count_nonzero(errors.wrong_track))',
             'wrong_track_ticks": 0',
         ),
         (
@@ -268,11 +268,11 @@ MUTANTS: list[Mutant] = [
     *_group(
         f"{WAYSIDE}/ranging/association.py",
         "rail_wayside/ranging/test_association.py",
-        ("trains may pass each other", "or (way_m > 0.0) == known", "or True"),
+        ("trains may pass each other", "or (distance_m > 0.0) == known", "or True"),
         (
             "one of two ways is taken",
-            "if found is not None and next(ways, None) is None",
-            "if found",
+            "if matching is not None and next(matchings, None) is None",
+            "if matching",
         ),
     ),
     *_group(
@@ -390,8 +390,8 @@ MUTANTS: list[Mutant] = [
         "nodes/test_atp_node.py::test_what_others_sealed_or_sealed_for_others_is_refused",
         (
             "the authority of another train is obeyed",
-            "told.direction) != mine:",
-            "told.direction) == ():",
+            "telegram.direction) != mine:",
+            "telegram.direction) == ():",
         ),
     ),
     *_group(
@@ -494,7 +494,7 @@ MUTANTS: list[Mutant] = [
         ("two that may be faulty are one", "(left.sum(axis=-1) == 1)", "(left.sum(axis=-1) >= 1)"),
     ),
     *_group(
-        f"{ONBOARD}/localizer/located.py",
+        f"{ONBOARD}/localizer/protected_interval.py",
         "nodes/test_track_code_nodes.py"
         "::test_supervision_judges_the_fastest_that_a_localizer_allows",
         (

@@ -14,11 +14,11 @@ from rail_corridor.plan.plan import Plan, make_plan
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.stamps import seconds_to_ns
 from rail_msgs_py.table import Table, TableWriter
-from rail_msgs_py.topics.localizer import LOCALIZER_STATE, TOLD_POSITION
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE, RELAYED_RANGE
 from rail_msgs_py.topics.train_radio import ATP_STATE, RADIO_TELEGRAMS, TRAIN_TELEGRAMS
 from rail_msgs_py.topics.world import COMMAND, ODOMETER
 from rail_msgs_py.train_radio.movement_authority import MovementAuthority
-from rail_msgs_py.train_radio.safe_frame import Kind
+from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.safe_result import Accepted
 from rail_msgs_py.train_radio.telegrams import Telegrams
 from rail_msgs_py.train_radio.train_channel import controller_end
@@ -60,7 +60,7 @@ class Protection:
         self.ticks = 0
         self.localizer = given.get("localizer", False)
         if self.localizer:
-            self.told = graph.mailbox(TOLD_POSITION, train=TRAIN)
+            self.told = graph.mailbox(RELAYED_RANGE, train=TRAIN)
             self._place = graph.sender(LOCALIZER_STATE, train=TRAIN)
             self._places = TableWriter((TRAIN,), LOCALIZER_STATE.columns)
         graph.add(AtpNode(namespace=f"/{TRAIN}", context=graph.context, parameters=given))
@@ -86,7 +86,9 @@ class Protection:
             "validity_s": TIMEOUT_S,
         }
         told = MovementAuthority(**fields | changes)
-        return bytes(self.controller.seal(Kind.MOVEMENT_AUTHORITY, told.to_bytes(), self.now_ns))
+        return bytes(
+            self.controller.seal(FrameKind.MOVEMENT_AUTHORITY, told.to_bytes(), self.now_ns)
+        )
 
     def tick(
         self,

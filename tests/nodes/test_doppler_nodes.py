@@ -26,7 +26,7 @@ from rail_msgs_py.waveform import Waveform, silence
 from rail_onboard.doppler.positioner_node import DopplerPositionerNode
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.doppler.signal import block_times_s, received_tones, reference_tone
-from rail_signals.doppler.solver import Reason
+from rail_signals.doppler.solver import NoFixReason
 from rail_wayside.doppler.reference_station_node import ReferenceStationNode
 from rail_world.doppler.medium_node import ReferenceMediumNode
 
@@ -269,7 +269,7 @@ def test_shifts_become_a_position(graph: Any, plan: Plan) -> None:
     for tick in range(3):
         true_m = 700.0 + 3.0 * tick
         fix, place = positioner.hears(tick, positioner.block(true_m, 30.0))
-        assert fix["reason"] == Reason.NONE
+        assert fix["reason"] == NoFixReason.NONE
         sigma_m = math.sqrt(fix["chainage_m2"])
         assert 0.0 < sigma_m < 5.0
         assert abs(fix["chainage_m"] - true_m) < 4.0 * sigma_m
@@ -286,10 +286,10 @@ def test_without_tones_or_speed_there_is_no_position(graph: Any, plan: Plan) -> 
     noise = rng.standard_normal((TONES.samples, 2)).view(np.complex128)[:, 0]
     for tick, (samples, reason) in enumerate(
         [
-            (None, Reason.TOO_FEW_STATIONS),
-            (noise, Reason.TOO_FEW_STATIONS),
-            (np.full(TONES.samples, math.nan), Reason.TOO_FEW_STATIONS),
-            (positioner.block(700.0, 0.0), Reason.STANDSTILL),
+            (None, NoFixReason.TOO_FEW_STATIONS),
+            (noise, NoFixReason.TOO_FEW_STATIONS),
+            (np.full(TONES.samples, math.nan), NoFixReason.TOO_FEW_STATIONS),
+            (positioner.block(700.0, 0.0), NoFixReason.STANDSTILL),
         ]
     ):
         fix, place = positioner.hears(tick, samples)
@@ -298,7 +298,7 @@ def test_without_tones_or_speed_there_is_no_position(graph: Any, plan: Plan) -> 
         assert not place.known and math.isinf(place.variance_m2)
     # It is found again where it is.
     fix, place = positioner.hears(4, positioner.block(705.0, 30.0))
-    assert fix["reason"] == Reason.NONE and place.known
+    assert fix["reason"] == NoFixReason.NONE and place.known
     told = [s.message for m in graph.diagnostics for s in m.status if "position" in s.name]
     assert told == ["too few stations", "standstill", "position known"]
 
@@ -308,7 +308,7 @@ def test_a_block_of_another_length_is_told_and_stops_nothing(graph: Any, plan: P
     short = Waveform(0, *RADIO, np.ones((1, 100), complex))
     positioner._rx(short.to_msg())
     fix, _ = positioner.hears(1, positioner.block(700.0, 30.0))
-    assert fix["reason"] == Reason.NONE
+    assert fix["reason"] == NoFixReason.NONE
     told = [s.message for m in graph.diagnostics for s in m.status if "software" in s.name]
     assert len(told) == 1 and "100" in told[0]
 
@@ -317,10 +317,10 @@ def test_switched_off_it_knows_nothing_and_on_again_it_begins_anew(graph: Any, p
     positioner = Positioner(graph, plan, start_m=700.0)
     for tick in range(5):
         fix, _ = positioner.hears(tick, positioner.block(700.0 + 8.0 * tick, 80.0))
-        assert fix["reason"] == Reason.NONE
+        assert fix["reason"] == NoFixReason.NONE
     graph.switch(POSITIONER, on=False)
     fix, place = positioner.hears(5, positioner.block(740.0, 80.0))
-    assert fix["reason"] == Reason.TOO_FEW_STATIONS
+    assert fix["reason"] == NoFixReason.TOO_FEW_STATIONS
     assert not place.known and math.isinf(place.variance_m2)
     graph.switch(POSITIONER, on=True)
     # It looks where it was put into service, as far off as that may be: 50 m.
@@ -328,7 +328,7 @@ def test_switched_off_it_knows_nothing_and_on_again_it_begins_anew(graph: Any, p
     assert not place.known
     assert place.chainage_m == 700.0
     fix, place = positioner.hears(7, positioner.block(710.0, 80.0))
-    assert fix["reason"] == Reason.NONE
+    assert fix["reason"] == NoFixReason.NONE
     assert place.chainage_m == pytest.approx(710.0, abs=5.0)
 
 

@@ -17,15 +17,15 @@ from rail_msgs_py.position import Position
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.table import Table
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
-from rail_msgs_py.topics.localizer import LOCALIZER_POSITION, LOCALIZER_STATE, TOLD_POSITION
+from rail_msgs_py.topics.localizer import LOCALIZER_POSITION, LOCALIZER_STATE, RELAYED_RANGE
 from rail_msgs_py.topics.ranging import POSITION
 from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.track_code import CODE_RECEIVED
 from rail_msgs_py.topics.world import ODOMETER
 from rail_onboard.localizer.localizer_node import LocalizerNode
 from rail_signals.localizer.localizer import Localizer
-from rail_signals.localizer.protection_level import Localization, Reason, Status
-from rail_signals.localizer.readings import DopplerFix, RangeFix, TickReadings, WheelSpeed
+from rail_signals.localizer.protection_level import Localization, ProtectionReason, Status
+from rail_signals.localizer.readings import DopplerFix, RangeFix, TickMeasurements, WheelSpeed
 from rail_signals.localizer.settings import (
     IntegrityClaim,
     LocalizerSettings,
@@ -57,7 +57,7 @@ class Train:
         self._senders = {ODOMETER.pattern: self._sender(ODOMETER)}
         for parameter, topic in (
             ("doppler", DOPPLER_FIX),
-            ("told", TOLD_POSITION),
+            ("told", RELAYED_RANGE),
             ("ranged", POSITION),
             ("joints_m", CODE_RECEIVED),
         ):
@@ -100,10 +100,10 @@ class Train:
             n = self.rng.standard_normal(2)
             healthy = (0.0, self.front_m + 2.0 * n[0], self.speed_mps + 0.2 * n[1], 4.0, 0.0, 0.04)
             self._row(DOPPLER_FIX, *(healthy if doppler is None else doppler))
-        if TOLD_POSITION.pattern in self._senders:
+        if RELAYED_RANGE.pattern in self._senders:
             # Four sigmas of 0.2 m, received in this tick and of use in the next.
             self._row(
-                TOLD_POSITION, *((time_s, self.range_m(), 0.8) if relayed is None else relayed)
+                RELAYED_RANGE, *((time_s, self.range_m(), 0.8) if relayed is None else relayed)
             )
         if POSITION.pattern in self._senders:
             chainage_m, variance_m2 = (self.range_m(), 0.04) if ranged is None else ranged
@@ -176,7 +176,7 @@ def test_the_node_says_what_the_localizer_says(graph: Any) -> None:
         here = Localization.of(
             alone.tick(
                 tick * TICK_NS / NANOSECONDS,
-                TickReadings(
+                TickMeasurements(
                     RangeFix(*ranged, 0.0, float(ranged[0] >= 1003.0)),
                     DopplerFix(*fix[1:], 0.0),
                     None,
@@ -187,7 +187,7 @@ def test_the_node_says_what_the_localizer_says(graph: Any) -> None:
         assert state == {
             "status": here.status,
             "reason": here.reason,
-            "found": here.found,
+            "found": here.detected,
             "excluded": 0.0,
             "front_m": here.position_m,
             "low_m": here.low_m,
@@ -220,7 +220,7 @@ def test_a_relayed_range_enters_with_its_age_and_its_sigma(graph: Any) -> None:
             age_s = time_s - measured_s
             ranging = RangeFix(range_m, 0.25, age_s, float(range_m >= 1001.0))
         here = Localization.of(
-            alone.tick(time_s, TickReadings(ranging, odometer=WheelSpeed(0.0, 0.0)))
+            alone.tick(time_s, TickMeasurements(ranging, odometer=WheelSpeed(0.0, 0.0)))
         )
         assert (state["front_m"], state["low_m"]) == (here.position_m, here.low_m)
         received = (tick * TICK_S - 0.3, relayed_m)
@@ -262,7 +262,7 @@ def test_a_range_frozen_at_a_stand_is_no_evidence_and_a_healthy_one_is(
     assert all(train.holds(state) for state in states)
     late = {state["status"] for state in states[LOST_TICKS:]}
     assert late == {Status.UNMONITORED if frozen else Status.PROTECTED}
-    reason = Reason.TOO_FEW_SENSORS if frozen else Reason.NONE
+    reason = ProtectionReason.TOO_FEW_SENSORS if frozen else ProtectionReason.NONE
     assert {state["reason"] for state in states[LOST_TICKS:]} == {reason}
     if frozen:
         graph.wait(lambda: train.health("readings")[0] == DiagnosticStatus.WARN)
@@ -339,7 +339,7 @@ def test_switched_on_again_it_does_not_believe_to_be_where_it_started(graph: Any
         train.tick()
     train.off_and_on()
     nowhere = train.tick(ranged=(0.0, math.inf))
-    assert (nowhere["status"], nowhere["reason"]) == (Status.UNAVAILABLE, Reason.NO_FIX)
+    assert (nowhere["status"], nowhere["reason"]) == (Status.UNAVAILABLE, ProtectionReason.NO_FIX)
     assert not train.position.known
     for _ in range(20):
         state = train.tick()
@@ -355,7 +355,7 @@ def test_switched_on_for_the_first_time_after_the_start_it_was_not_placed_either
     train.change(Transition.TRANSITION_DEACTIVATE)
     train.tick()
     train.change(Transition.TRANSITION_ACTIVATE)
-    assert train.tick(ranged=(0.0, math.inf))["reason"] == Reason.NO_FIX
+    assert train.tick(ranged=(0.0, math.inf))["reason"] == ProtectionReason.NO_FIX
 
 
 def test_an_excluded_sensor_and_a_frozen_one_are_forgotten_with_the_switch(graph: Any) -> None:
@@ -393,10 +393,10 @@ def test_the_first_carrier_after_the_switch_is_no_joint_passed(graph: Any) -> No
     train = Train(graph, **joints)
     train.tick(carrier_hz=1700.0)
     train.off_and_on()
-    assert train.tick(carrier_hz=2300.0)["reason"] == Reason.NO_FIX
+    assert train.tick(carrier_hz=2300.0)["reason"] == ProtectionReason.NO_FIX
     # Nor is a later one, while it is not known which joint is near.
     train.tick(carrier_hz=1700.0)
-    assert train.tick(carrier_hz=2300.0)["reason"] == Reason.NO_FIX
+    assert train.tick(carrier_hz=2300.0)["reason"] == ProtectionReason.NO_FIX
 
 
 @pytest.mark.parametrize(

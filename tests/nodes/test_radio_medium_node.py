@@ -19,7 +19,7 @@ from rail_msgs_py.topics.ranging import LINKS, VRS_RX, VRS_TX, WRS_RX, WRS_TX
 from rail_msgs_py.topics.tick import DONE, FAILED
 from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.waveform import Waveform, silence
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import RangingSignal, modulate
 from rail_world.ranging.description import RadioDescription
 from rail_world.ranging.medium_node import RadioMediumNode
@@ -99,7 +99,7 @@ def plan(tmp_path: Path) -> Plan:
 
 
 def one_way_m(block: Waveform) -> float:
-    lag_rad = LineReceiver(SIGNAL).estimate(block.samples[0]).phase_lag_rad[0]
+    lag_rad = FmToneReceiver(SIGNAL).estimate(block.samples[0]).phase_lag_rad[0]
     return float(lag_rad) * C_MPS / (2.0 * math.pi * SIGNAL.tones_hz[0])
 
 

@@ -11,7 +11,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
-from rail_corridor.run.bystander import FULL_NAME, Bystander
+from rail_corridor.run.external_traffic import FULL_NAME, ExternalTrafficRecorder
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.stamps import clock_to_cdr
@@ -80,7 +80,7 @@ def test_without_a_tap_publishers_are_those_of_ros(graph: Any) -> None:
 def test_a_bystander_tells_what_a_stranger_publishes(graph: Any) -> None:
     told = Told()
     shared = (READY, FAILED)
-    graph.add(Bystander(["/theirs"], told.open, shared, context=graph.context))
+    graph.add(ExternalTrafficRecorder(["/theirs"], told.open, shared, context=graph.context))
     stranger = CorridorNode("theirs", "/", context=graph.context, services=False)
     tick = stranger.publisher(CLOCK)
     own = stranger.create_publisher(String, "/theirs/own", 10)

@@ -168,8 +168,8 @@ def test_supervision_brakes_without_a_code_and_releases_with_one(graph: Any) -> 
         values = dict.fromkeys(CODE_RECEIVED.columns, 0.0)
         if fields is not None:
             values |= {"carrier_hz": 1700.0, "valid": 1.0, **fields}
-        figures = np.array([[values[name] for name in CODE_RECEIVED.columns]], dtype=float)
-        code(codes.write(number * TICK_NS, figures))
+        cells = np.array([[values[name] for name in CODE_RECEIVED.columns]], dtype=float)
+        code(codes.write(number * TICK_NS, cells))
         odometer(wheels.write(number * TICK_NS, np.array([[0.0, speed_mps]])))
         graph.wait(lambda: len(box) > number)
         assert to_ns_of(box[-1]) == number * TICK_NS

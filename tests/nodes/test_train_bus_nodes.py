@@ -124,7 +124,7 @@ def test_a_tail_without_a_bus_says_so(graph: Any) -> None:
     tail.tick(0, FRAME.waveform(BusMessage("head", 0, None, 0).to_bytes()))
     for tick in range(1, 12):
         broken = np.full(FRAME.samples, math.nan) if tick % 2 else None
-        assert said(tail.tick(tick, broken)).heard == 0
+        assert said(tail.tick(tick, broken)).received_tick == 0
     found = last(tail.link)
     assert (found["received"], found["lost"]) == (1.0, 11.0)
     assert math.isnan(found["ebn0_db"])
@@ -137,7 +137,7 @@ def test_a_tail_without_a_bus_says_so(graph: Any) -> None:
     assert told == [
         (DiagnosticStatus.OK, "hears the head"),
         (DiagnosticStatus.WARN, "loses messages of the head"),
-        (DiagnosticStatus.ERROR, "the head is not heard"),
+        (DiagnosticStatus.ERROR, "the head is not received"),
     ]
 
 
@@ -219,7 +219,7 @@ class Monitor:
         self.consist = train_consist(CARS)
         self.instrument = Reflectometer(self.consist.termination.resistance_ohm)
         self._rng = rng = np.random.default_rng(5)
-        self._line = self.consist.line(Deviations.draw(len(CARS), rng))
+        self._line = self.consist.bus_line(Deviations.draw(len(CARS), rng))
         self._rough = draw_roughness(self.consist, rng)
         given = {"cars": CARS, "tick_s": 1e-9 * TICK_NS, "period_s": 1.0, "traces": 4, **given}
         node = TrainBusMonitorNode(context=graph.context, parameters=given)
@@ -230,7 +230,7 @@ class Monitor:
     def echoes(self, fault: BusFault | None) -> Any:
         """What the cable sends back to four edges."""
         line = self._line if fault is None else fault.apply(self._line)
-        samples = self.instrument.samples_for(self.consist.line().delay_s)
+        samples = self.instrument.samples_for(self.consist.bus_line().delay_s)
         rough = roughened(line, self._rough)
         return measure(rough, self.instrument, self._rng, 4, samples=samples).reflection
 

@@ -256,9 +256,9 @@ def test_a_radio_takes_its_frame_and_answers_on_the_channel_in_force(
     # Before it has heard a base station there is nobody to speak to.
     assert radio.sends(0).silent
     assert radio.hears(0, {2: 1e-3, 3: 3e-4}, {2: FIRST}) == ((2, FIRST),)
-    figures = radio.figures
-    assert (figures["channel"], figures["bursts"]) == (2.0, 1.0)
-    assert figures["beacon_snr"] > 100.0
+    values = radio.figures
+    assert (values["channel"], values["bursts"]) == (2.0, 1.0)
+    assert values["beacon_snr"] > 100.0
     radio.order(0, (2, SECOND))
     block = radio.sends(1)
     assert (block.channel, block.carrier_hz) == (2, 2.451e9)

@@ -15,7 +15,7 @@ from rail_msgs_py.table import Table
 from rail_msgs_py.topics.ranging import VRS_CHANNEL, VRS_RX, VRS_TX
 from rail_msgs_py.waveform import Waveform, silence
 from rail_onboard.ranging.vrs_node import VrsNode
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import RangingSignal, modulate
 
 SIGNAL = RangingSignal()
@@ -71,7 +71,7 @@ def test_it_returns_the_tone_a_delay_later(graph: Any, trim_s: float) -> None:
     reply = vehicle.answer(3, {1: -50.0}, lag_rad=0.4)
     assert (reply.stamp_ns, reply.channel, reply.carrier_hz) == (3 * TICK_NS, 2, 2.405e9)
     assert reply.power_dbm == pytest.approx(-10.0, abs=1e-6)
-    lag_rad = LineReceiver(SIGNAL).estimate(reply.samples[0]).phase_lag_rad[0]
+    lag_rad = FmToneReceiver(SIGNAL).estimate(reply.samples[0]).phase_lag_rad[0]
     # -50 dBm over -100 dBm of noise: 0.1 mrad.
     assert lag_rad == pytest.approx(0.4 + 2 * math.pi * 375e3 * (DELAY_S + trim_s), abs=1e-3)
 

@@ -29,7 +29,7 @@ from rail_corridor.recording.frames import (
 )
 from rail_corridor.recording.mcap_file import RecordingFile
 from rail_corridor.recording.mcap_recorder import McapRecorder, Source
-from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
+from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
 from rail_corridor.report.from_recording import report_of
 from rail_corridor.report.intake import Intake
 from rail_corridor.report.report import make_report, report_text
@@ -84,10 +84,10 @@ def _messages(plan: Plan, ticks: int = TICKS) -> Iterator[Said]:
     here = STATE.index
     for tick in range(ticks):
         ns, way_m = tick * plan.world.tick_ns, 20.0 + 2.0 * tick
-        figures = np.zeros((1, len(here)))
-        figures[0, [here["path_m"], here["x_m"], here["chainage_m"]]] = way_m
-        figures[0, [here["speed_mps"], here["on_line"]]] = 20.0, 1.0
-        yield Said(STATE, STATE.name(), state.write(ns, figures))
+        values = np.zeros((1, len(here)))
+        values[0, [here["path_m"], here["x_m"], here["chainage_m"]]] = way_m
+        values[0, [here["speed_mps"], here["on_line"]]] = 20.0, 1.0
+        yield Said(STATE, STATE.name(), state.write(ns, values))
         yield Said(CLOCK, CLOCK.name(), clock_to_cdr(ns))
         row = np.array([[1.0, 2.0, -50.0, *[-90.0] * (len(channels) - 1)]])
         yield Said(VRS_CHANNEL, VRS_CHANNEL.name(train=TRAIN), channel.write(ns, row))
@@ -133,7 +133,7 @@ def _write(
     files: list[Attachment] | None = None,
 ) -> None:
     """Record these messages; with the report of the run, if it came to one."""
-    beginning = {BEGIN: Beginning(scenario.name, scenario.seed, NODES, PROCESSES).values()}
+    beginning = {BEGIN: RunStart(scenario.name, scenario.seed, NODES, PROCESSES).values()}
     with path.open("wb") as stream:
         recorder = McapRecorder(stream, files_of(scenario) if files is None else files, beginning)
         source, numbers = Source(), {}
@@ -147,7 +147,7 @@ def _write(
         if report is not None:
             file = Attachment("report.json", "application/json", report_text(report).encode())
             recorder.take(source, ATTACHMENT, 0, memoryview(attachment_frame(file))[7:])
-            end = Ending(report["complete"], report["ticks"], report["wall_time_s"])
+            end = RunEnd(report["complete"], report["ticks"], report["wall_time_s"])
             recorder.take(source, METADATA, 0, memoryview(metadata_frame(END, end.values()))[7:])
         recorder.close()
 

@@ -154,8 +154,8 @@ class RunBuilder:
             speed_mps=0.0,
         )
         columns = ("downlink", "uplink", *(f"level_{n}" for n in range(self._channels)))
-        figures = dict.fromkeys(columns, 0.0) | {"downlink": channel}
-        self._put(self._recording[VRS_CHANNEL], index, columns, **figures)
+        values = dict.fromkeys(columns, 0.0) | {"downlink": channel}
+        self._put(self._recording[VRS_CHANNEL], index, columns, **values)
         return self
 
     def fixed(
@@ -252,7 +252,7 @@ class RunBuilder:
         )
         return self
 
-    def reported(self, train: str, tick: int, **figures: float) -> RunBuilder:
+    def reported(self, train: str, tick: int, **rows: float) -> RunBuilder:
         """A location report that the zone controller took: genuine but for the figures given."""
         index = self.trains.index(train)
         believed = self._recording[ATP_STATE].upto(self.ticks)[tick, index]
@@ -268,7 +268,7 @@ class RunBuilder:
             "integrity_confirmed": 1.0,
             "position_valid": 1.0,
         }
-        values = np.array([list((row | figures).values())])
+        values = np.array([list((row | rows).values())])
         self._recording.events(REPORTS).put(tick, index, values)
         return self
 
@@ -365,11 +365,11 @@ class RunBuilder:
         for name in self.buses:
             self.bus(name)
 
-    def _put(self, record: Record, row: int, columns: Sequence[str], **figures: ArrayLike) -> None:
+    def _put(self, record: Record, row: int, columns: Sequence[str], **rows: ArrayLike) -> None:
         """Put one row of every tick; each column has a figure, or an array over the ticks."""
-        for tick, values in enumerate(self._rows(columns, figures)):
+        for tick, values in enumerate(self._rows(columns, rows)):
             record.put(tick, row, values)
 
-    def _rows(self, columns: Sequence[str], figures: dict[str, ArrayLike]) -> Iterator[Any]:
-        table = [np.broadcast_to(np.asarray(figures[name], float), self.ticks) for name in columns]
+    def _rows(self, columns: Sequence[str], values: dict[str, ArrayLike]) -> Iterator[Any]:
+        table = [np.broadcast_to(np.asarray(values[name], float), self.ticks) for name in columns]
         yield from np.stack(table, axis=1)

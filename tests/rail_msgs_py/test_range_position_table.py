@@ -72,8 +72,8 @@ def test_a_position_in_all_its_forms(place: Position) -> None:
     written = PositionWriter(place.train, place.track).write(place)
     for raw in (place.to_cdr(), written):
         assert same(Position.from_msg(deserialize_message(raw, Odometry)), place)
-        stamp_ns, track, figures = position.figures_from_cdr(raw)
-        read = Position(stamp_ns, place.train, track, *figures)
+        stamp_ns, track, values = position.position_from_cdr(raw)
+        read = Position(stamp_ns, place.train, track, *values)
         assert same(read, place)
         assert same(Position.from_cdr(raw), place)
 
@@ -119,17 +119,17 @@ def test_a_table_in_all_its_forms(written: Table) -> None:
             written.columns,
         )
         assert np.array_equal(read.values, written.values, equal_nan=True)
-    stamp_ns, values = table.figures_from_cdr(raw, *written.values.shape)
+    stamp_ns, values = table.values_from_cdr(raw, *written.values.shape)
     assert stamp_ns == written.stamp_ns
     assert np.array_equal(values, written.values, equal_nan=True)
 
 
 def test_a_row_of_a_table_by_name() -> None:
     values = np.array([[1.0, 2.0], [3.0, 4.0]])
-    figures = Table(0, ("train_a", "train_b"), ("x_m", "speed_mps"), values)
-    assert figures.row("train_b") == {"x_m": 3.0, "speed_mps": 4.0}
+    rows = Table(0, ("train_a", "train_b"), ("x_m", "speed_mps"), values)
+    assert rows.row("train_b") == {"x_m": 3.0, "speed_mps": 4.0}
     with pytest.raises(ValueError):
-        figures.row("train_c")
+        rows.row("train_c")
 
 
 def test_table_data_begin_with_the_stamp() -> None:

@@ -47,7 +47,7 @@ def test_jammed_channel(rail: Rail) -> None:
     assert 8.0 in told(report, "/wayside/wrs3: zone3", "channel jammed on CH2")
     (jammed_s,) = told(report, "/train_a/vrs: ranging", "channel jammed on CH1")[:1]
     assert 30.0 <= jammed_s < 40.0
-    assert told(report, "/wayside/zone_controller: train_a", "not heard in zone5")
+    assert told(report, "/wayside/zone_controller: train_a", "not received in zone5")
     train = report["trains"]["train_a"]
     assert 0.8 < train["phase_ranging"]["availability"] < 1.0
     # Between the jammers, and after them, it is as good as ever: 95 % are within the jammed 1 m.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rail_corridor.studies.handover import Row
+from rail_corridor.studies.handover import HandoverRow
 from rail_corridor.studies.handover_scenarios import (
     CORRIDORS,
     MANOEUVRE_KMH,
@@ -35,7 +35,7 @@ def test_no_handover_is_missed_and_no_position_is_false(
 ) -> None:
     path = rail.directory / "run.yaml"
     path.write_text(json.dumps(scenario_data(situation, trains, seed=3)))
-    row = Row(situation)
+    row = HandoverRow(situation)
     row.add(rail.report(path, "--processes", "one", *options))
     assert row.crossings >= crossings
     assert row.made == row.crossings

@@ -105,9 +105,9 @@ def from_validation(
     inner = _FIELD_IN_REASON.fullmatch(reason) if first["type"] == "value_error" else None
     if inner:  # validators of whole models name the field they complain about
         inner_path = inner[1].split(".")
-        found = _real_path(inner_path, value)
+        location = _real_path(inner_path, value)
         if isinstance(value, dict):
-            value = _value_at(value, found) if len(found) == len(inner_path) else MISSING
+            value = _value_at(value, location) if len(location) == len(inner_path) else MISSING
         path += inner_path
         reason = inner[2]
     reason = re.sub(r"^Input should be ", "must be ", reason)

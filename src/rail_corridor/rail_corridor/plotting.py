@@ -34,7 +34,7 @@ STYLE: Any = {
 }
 
 
-class Picture(NamedTuple):
+class FigureSpec(NamedTuple):
     """What draws a figure, and a sentence that says what to see in it."""
 
     draw: Callable[[Figure], None]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from rclpy.serialization import deserialize_message
 
-from rail_msgs_py.table import Table, figures_from_cdr
+from rail_msgs_py.table import Table, values_from_cdr
 from rail_msgs_py.topics.topic import Topic
 from rail_signals.arrays import BoolArray, FloatArray
 
@@ -130,7 +130,7 @@ class RecordSpec:
         if self.events:
             return self._lines
         width = self.width
-        return lambda raw: figures_from_cdr(raw, rows, width)
+        return lambda raw: values_from_cdr(raw, rows, width)
 
     def _lines(self, raw: bytes) -> tuple[int, FloatArray]:
         """Decoder of a table of any number of lines."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rail_msgs_py.topics.topic import Topic
 
 from .stamps import clock_from_cdr
-from .table import figures_from_cdr
+from .table import values_from_cdr
 from .waveform import Waveform, silent_stamp_ns
 
 Item = TypeVar("Item")
@@ -51,7 +51,7 @@ def table(topic: Topic, rows: int) -> Decoder[NDArray[np.float64]]:
     columns = len(topic.columns)
 
     def decode(raw: bytes) -> tuple[int, NDArray[np.float64]]:
-        return figures_from_cdr(raw, rows, columns)
+        return values_from_cdr(raw, rows, columns)
 
     return decode
 
@@ -61,7 +61,7 @@ def table_row(topic: Topic) -> Decoder[list[float]]:
     columns = len(topic.columns)
 
     def decode(raw: bytes) -> tuple[int, list[float]]:
-        stamp_ns, values = figures_from_cdr(raw, 1, columns)
+        stamp_ns, values = values_from_cdr(raw, 1, columns)
         return stamp_ns, values[0].tolist()
 
     return decode

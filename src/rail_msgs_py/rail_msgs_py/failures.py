@@ -59,9 +59,9 @@ class FailureWatch:
         self._owners = owners
         self._on_failed = on_failed
         self._publisher = node.publisher(FAILED)
-        node.listen(FAILED, self._heard)
+        node.listen(FAILED, self._on_failure)
 
-    def _heard(self, message: Any) -> None:
+    def _on_failure(self, message: Any) -> None:
         ports = tuple(port for port, owner in self._owners.items() if owner == message.name)
         if ports:
             self._on_failed(ports)
@@ -90,7 +90,7 @@ class TickWatch(FailureWatch):
     inbox : TickInbox
     owners : dict
         Port to the fully qualified name of the node that sends it. A port that is missing here,
-        such as the clock, is waited for for ever.
+        such as the clock, is waited for indefinitely.
     timeout_s : float
         Wall time from `begin` until ports are given up.
     advance : callable

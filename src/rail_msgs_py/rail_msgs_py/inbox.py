@@ -25,7 +25,7 @@ class TickInbox(Generic[Item]):
         self._awaited = set(self.ports)
         self._ticks: dict[int, dict[str, Item]] = {}
         self._first: dict[str, Item] | None = None
-        self._taken_ns = -1
+        self._latest_taken_ns = -1
 
     def open(self, port: str) -> None:
         """Wait for one more port from now on."""
@@ -38,7 +38,7 @@ class TickInbox(Generic[Item]):
             self._awaited.add(port)
         items = self._ticks.get(stamp_ns)
         if items is None:
-            if stamp_ns <= self._taken_ns:
+            if stamp_ns <= self._latest_taken_ns:
                 return
             items = self._ticks[stamp_ns] = {}
             self._find_first()
@@ -52,7 +52,7 @@ class TickInbox(Generic[Item]):
     @property
     def latest_ns(self) -> int:
         """Stamp of the tick at hand, or of the last one taken; 0 before the first."""
-        return max(self._taken_ns, 0) if self.stamp_ns is None else self.stamp_ns
+        return max(self._latest_taken_ns, 0) if self.stamp_ns is None else self.stamp_ns
 
     @property
     def complete(self) -> bool:
@@ -90,7 +90,7 @@ class TickInbox(Generic[Item]):
             raise LookupError("nothing has arrived")
         stamp_ns = min(self._ticks)
         items = self._ticks.pop(stamp_ns)
-        self._taken_ns = stamp_ns
+        self._latest_taken_ns = stamp_ns
         self._find_first()
         return stamp_ns, {port: items[port] for port in self.ports if port in items}
 
@@ -98,7 +98,7 @@ class TickInbox(Generic[Item]):
         """Forget everything, as when simulated time jumps back."""
         self._ticks.clear()
         self._first = None
-        self._taken_ns = -1
+        self._latest_taken_ns = -1
         self._awaited = set(self.ports)
 
     def _find_first(self) -> None:

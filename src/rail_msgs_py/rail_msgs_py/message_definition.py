@@ -44,11 +44,11 @@ def message_class(name: str) -> Any:
     try:
         if matched is None:
             raise LookupError
-        found = getattr(importlib.import_module(f"{matched[1]}.msg"), matched[2])
-        found.get_fields_and_field_types  # noqa: B018, a class of another kind has none
+        definitions = getattr(importlib.import_module(f"{matched[1]}.msg"), matched[2])
+        definitions.get_fields_and_field_types  # noqa: B018, a class of another kind has none
     except (ImportError, AttributeError, LookupError):
         raise LookupError(f"no message type {name[:100]!r} is installed") from None
-    return found
+    return definitions
 
 
 @lru_cache(maxsize=256)
@@ -84,14 +84,14 @@ def _short(name: str) -> str:
 
 def _types_in(text: str, package: str) -> list[str]:
     """Names of the types of the fields, primitives left out."""
-    found = []
+    definitions = []
     for line in text.splitlines():
         field = _FIELD.match(line.partition("#")[0].strip())
         if field is None or field[1] in _PRIMITIVES:  # as those of constants are
             continue
         parts = field[1].split("/")
-        found.append(f"{package if len(parts) == 1 else parts[0]}/msg/{parts[-1]}")
-    return found
+        definitions.append(f"{package if len(parts) == 1 else parts[0]}/msg/{parts[-1]}")
+    return definitions
 
 
 def _file_of(name: str) -> Path:

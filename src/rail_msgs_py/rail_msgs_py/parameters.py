@@ -99,10 +99,10 @@ def descriptor(field: dataclasses.Field[Any], hint: Any) -> ParameterDescriptor:
 
 def overrides(values: dict[str, Any]) -> list[Parameter]:
     """Parameter overrides for a node made in this process."""
-    made = []
+    overridden = []
     for name, value in values.items():
         if isinstance(value, tuple):
             value = list(value)
         if value != []:
-            made.append(Parameter(name, value=value))
-    return made
+            overridden.append(Parameter(name, value=value))
+    return overridden

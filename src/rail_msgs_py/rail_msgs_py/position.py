@@ -89,7 +89,7 @@ class Position:
     @classmethod
     def from_cdr(cls, raw: bytes) -> Position:
         """View of a serialised message."""
-        stamp_ns, track, values = figures_from_cdr(raw)
+        stamp_ns, track, values = position_from_cdr(raw)
         # The name behind that of the track, which ends in a zero byte and is filled up to four.
         at = _HEAD.size + -(-(len(track.encode()) + 1) // 4) * 4
         length = int.from_bytes(raw[at : at + 4], "little")
@@ -108,7 +108,7 @@ class Position:
 
 
 class PositionWriter:
-    """Serialises the positions of one train on one track: only stamp and figures change."""
+    """Serialises the positions of one train on one track: only stamp and values change."""
 
     def __init__(self, train: str, track: str) -> None:
         raw = Position(0, train, track, 0.0, 0.0, 0.0, 0.0).to_cdr()
@@ -119,18 +119,18 @@ class PositionWriter:
     def write(self, position: Position) -> bytes:
         """Serialised position."""
         _STAMP.pack_into(self._raw, 4, *divmod(position.stamp_ns, NANOSECONDS))
-        figures = (
+        values = (
             position.chainage_m,
             position.variance_m2,
             position.speed_mps,
             position.speed_variance_m2ps2,
         )
-        for place, figure in zip(self._places, figures, strict=True):
-            _PACK.pack_into(self._raw, place, figure)
+        for place, value in zip(self._places, values, strict=True):
+            _PACK.pack_into(self._raw, place, value)
         return bytes(self._raw)
 
 
-def figures_from_cdr(raw: bytes) -> tuple[int, str, tuple[float, float, float, float]]:
+def position_from_cdr(raw: bytes) -> tuple[int, str, tuple[float, float, float, float]]:
     """Stamp [ns], track, and chainage, variance, speed, speed variance of a serialised position.
 
     The part of a position that is read every tick, without unpacking the rest.
@@ -138,5 +138,5 @@ def figures_from_cdr(raw: bytes) -> tuple[int, str, tuple[float, float, float, f
     _, sec, nanosec, length = _HEAD.unpack_from(raw)
     track = raw[_HEAD.size : _HEAD.size + length - 1].decode()
     tail = len(raw) - 8 * _TAIL_VALUES
-    figures = tuple(_PACK.unpack_from(raw, tail + place)[0] for place in _PLACES)
-    return sec * NANOSECONDS + nanosec, track, figures
+    values = tuple(_PACK.unpack_from(raw, tail + place)[0] for place in _PLACES)
+    return sec * NANOSECONDS + nanosec, track, values

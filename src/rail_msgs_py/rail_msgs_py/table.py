@@ -1,6 +1,6 @@
 """Labelled tables of numbers as ``std_msgs/Float64MultiArray``.
 
-For figures that have no standard type: ``layout.dim[0]`` carries the names of the rows,
+For values that have no standard type: ``layout.dim[0]`` carries the names of the rows,
 ``layout.dim[1]`` those of the columns, each joined by commas; ``data_offset`` 1: the leading
 value is the stamp [s].
 """
@@ -22,7 +22,7 @@ from .stamps import NANOSECONDS, seconds_to_ns
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Rows by columns of figures at one instant.
+    """Rows by columns of values at one instant.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ class Table:
     values: NDArray[np.float64]
 
     def row(self, name: str) -> dict[str, float]:
-        """Figures of one row by column name."""
-        figures = self.values[self.rows.index(name)]
-        return {column: float(x) for column, x in zip(self.columns, figures, strict=True)}
+        """Values of one row by column name."""
+        values = self.values[self.rows.index(name)]
+        return {column: float(x) for column, x in zip(self.columns, values, strict=True)}
 
     def to_msg(self) -> Float64MultiArray:
         """Message form."""
@@ -87,7 +87,7 @@ def _names(dim: Any) -> tuple[str, ...]:
 
 
 class TableWriter:
-    """Serialises the tables of one topic: only stamp and figures change."""
+    """Serialises the tables of one topic: only stamp and values change."""
 
     def __init__(self, rows: tuple[str, ...], columns: tuple[str, ...]) -> None:
         blank = Table(0, rows, columns, np.zeros((len(rows), len(columns))))
@@ -99,7 +99,7 @@ class TableWriter:
         return b"".join((self._prefix, struct.pack("<d", stamp_ns / NANOSECONDS), values.tobytes()))
 
 
-def figures_from_cdr(raw: bytes, rows: int, columns: int) -> tuple[int, NDArray[np.float64]]:
+def values_from_cdr(raw: bytes, rows: int, columns: int) -> tuple[int, NDArray[np.float64]]:
     """Stamp [ns] and values [row, column] of a serialised table of known shape."""
     tail = np.frombuffer(raw, np.float64, 1 + rows * columns, len(raw) - 8 * (1 + rows * columns))
     return seconds_to_ns(float(tail[0])), tail[1:].reshape(rows, columns)

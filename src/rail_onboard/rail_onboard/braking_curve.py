@@ -1,4 +1,4 @@
-"""Braking that may be counted on, as closed forms of the speed and of the way.
+"""Guaranteed braking, as closed forms of the speed and of the distance.
 
 A train measured at v gathers ``a`` for the dead time ``T`` until its brakes act, then comes down
 to the speed e with the deceleration b:
@@ -27,7 +27,7 @@ class GuaranteedBraking:
     Parameters
     ----------
     service_mps2, emergency_mps2 : float
-        Deceleration on level track that may be counted on; the emergency brake is no weaker.
+        Guaranteed brake rate on level track (IEEE 1474.1); the emergency brake is no weaker.
     fall_permil : float
         Steepest fall on which the train runs, not negative.
     delay_s : float
@@ -95,11 +95,11 @@ class GuaranteedBraking:
         a, t, v = self.gathering_mps2, self.delay_s, (1.0 + self.speed_error) * speed_mps
         return (v + 0.5 * a * t) * t + (v + a * t) ** 2 / (2.0 * b)
 
-    def speed_mps(self, way_m: float, end_mps: float = 0.0) -> float:
+    def speed_mps(self, distance_m: float, end_mps: float = 0.0) -> float:
         """Measured speed from which the service brake leaves ``end_mps`` after a way, D(v, e).
 
         Negative where no speed is low enough.
         """
         b, a, t = self.service_deceleration_mps2, self.gathering_mps2, self.delay_s
-        square = (b * t) ** 2 + end_mps**2 + 2.0 * b * max(0.0, way_m) + a * b * t**2
+        square = (b * t) ** 2 + end_mps**2 + 2.0 * b * max(0.0, distance_m) + a * b * t**2
         return (sqrt(square) - b * t - a * t) / (1.0 + self.speed_error)

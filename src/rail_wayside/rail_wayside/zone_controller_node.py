@@ -1,6 +1,6 @@
 """Zone controller: turns the ranges of all stations into positions of all trains.
 
-With base stations it also gives movement authorities, from reports and ranges (`AuthorityDesk`).
+With base stations it also gives movement authorities, from reports and ranges (`AuthorityIssuer`).
 
 Topics in: ``/clock``, every ``range``, every base station's ``telegrams`` or, with ``backbone``,
 its ``uplink_telegrams``. Topics out: ``~/<train>/position``, ``~/<train>/reports``,
@@ -37,10 +37,10 @@ from rail_msgs_py.topics.train_radio import (
     UP_TELEGRAMS,
 )
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
-from rail_wayside.ranging.train_tracker import NOT_HEARD, Fix, Reading, ZoneTracker
-from rail_wayside.ranging.zone_map import Zone, ZoneMap
-from rail_wayside.train_radio.authority_issuer import Taken
-from rail_wayside.train_radio.parameters import AuthorityParameters, desk_of
+from rail_wayside.ranging.train_tracker import NO_READING, TrainFix, ZoneReading, ZoneTracker
+from rail_wayside.ranging.zone_map import MappedZone, ZoneMap
+from rail_wayside.train_radio.authority_issuer import AcceptedReport
+from rail_wayside.train_radio.parameters import AuthorityParameters, authority_issuer_of
 
 _fields = attrgetter(*REPORTS.columns[1:])
 
@@ -90,7 +90,7 @@ def zone_map_of(p: ZoneControllerParameters) -> ZoneMap:
     chainages = np.split(np.asarray(p.table_chainage_m), cuts)
     distances = np.split(np.asarray(p.table_distance_m), cuts)
     zones = [
-        Zone(*row)
+        MappedZone(*row)
         for row in zip(
             p.zones, p.sites, p.tracks, p.starts_m, p.ends_m, chainages, distances, strict=True
         )
@@ -115,19 +115,19 @@ class ZoneControllerNode(
             name: self.inputs.port(RANGE, _reading, site=zone.site, zone=name)
             for name, zone in sorted(zone_map.zones.items())
         }
-        self._open_desk()
+        self._open_issuer()
         # The clock is a port like the others: a tick ends though no station answers.
         self.inputs.clock()
         self._done = self.stream_out(DONE, node=self.get_fully_qualified_name())
 
-    def _open_desk(self) -> None:
+    def _open_issuer(self) -> None:
         """Begin to speak with trains."""
         p = self._p
-        self._desk = desk_of(p)
+        self._issuer = authority_issuer_of(p)
         self._segments = {name: number for number, name in enumerate(p.segments)}
         # Without a desk there are no numbers.
         self._numbers = dict(zip(p.trains, p.train_numbers, strict=False))
-        trains = p.trains if self._desk else ()
+        trains = p.trains if self._issuer else ()
         self._authorities = {
             train: self.table_out(AUTHORITY, (train,), train=train) for train in trains
         }
@@ -149,30 +149,32 @@ class ZoneControllerNode(
         self._report_zones(stamp_ns)
         self._done(header_to_cdr(stamp_ns))
 
-    def _authorise(self, stamp_ns: int, fixes: Iterable[Fix], items: Mapping[str, Any]) -> None:
+    def _authorise(
+        self, stamp_ns: int, fixes: Iterable[TrainFix], items: Mapping[str, Any]
+    ) -> None:
         """Take the trains' reports of a tick, and give authorities for the next one."""
-        desk = self._desk
-        if desk is None:
+        issuer = self._issuer
+        if issuer is None:
             return
-        taken: dict[int, list[Taken]] = {}
+        accepted: dict[int, list[AcceptedReport]] = {}
         for base, port in self._base_ports.items():
             for slot, frame in items[port].frames if port in items else ():
-                if (report := desk.receive(base, slot, frame, stamp_ns)) is not None:
-                    taken.setdefault(slot, []).append(report)
+                if (report := issuer.receive(base, slot, frame, stamp_ns)) is not None:
+                    accepted.setdefault(slot, []).append(report)
         numbers = self._numbers
         for train, publish_reports in self._reports.items():
-            publish_reports(_reports(stamp_ns, taken.get(numbers[train], ())))
+            publish_reports(_reports(stamp_ns, accepted.get(numbers[train], ())))
         for fix in fixes:
             segment = self._segments.get(fix.track)
             if segment is not None:
                 place = (segment, fix.chainage_m, fix.variance_m2)
-                desk.ranged(numbers[fix.train], stamp_ns * 1e-9, *place)
-        for base, frames in desk.telegrams(stamp_ns).items():
+                issuer.ranged(numbers[fix.train], stamp_ns * 1e-9, *place)
+        for base, frames in issuer.telegrams(stamp_ns).items():
             self._down[base](telegrams(stamp_ns, frames))
         for train, publish in self._authorities.items():
-            figures = np.array([desk.given(numbers[train], stamp_ns)], dtype=np.float64)
-            publish(stamp_ns, figures)
-            trouble = desk.troubles(numbers[train])
+            values = np.array([issuer.authority_state(numbers[train], stamp_ns)], dtype=np.float64)
+            publish(stamp_ns, values)
+            trouble = issuer.troubles(numbers[train])
             self.report(
                 DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK,
                 f"{train} authority",
@@ -180,7 +182,7 @@ class ZoneControllerNode(
                 stamp_ns=stamp_ns,
             )
 
-    def _publish(self, stamp_ns: int, fix: Fix) -> None:
+    def _publish(self, stamp_ns: int, fix: TrainFix) -> None:
         key = (fix.train, fix.track)
         if key not in self._writers:
             self._writers[key] = PositionWriter(*key)
@@ -213,16 +215,16 @@ def _reports_table(count: int) -> TableWriter:
     return TableWriter(rows, REPORTS.columns)
 
 
-def _reports(stamp_ns: int, taken: Sequence[Taken]) -> bytes:
+def _reports(stamp_ns: int, accepted: Sequence[AcceptedReport]) -> bytes:
     """Table of the reports taken from a train in a tick."""
-    figures = [(sealed_s, *_fields(report)) for sealed_s, report in taken]
-    values = np.array(figures, dtype=np.float64).reshape(len(taken), len(REPORTS.columns))
-    return _reports_table(len(taken)).write(stamp_ns, values)
+    rows = [(sealed_s, *_fields(report)) for sealed_s, report in accepted]
+    values = np.array(rows, dtype=np.float64).reshape(len(accepted), len(REPORTS.columns))
+    return _reports_table(len(accepted)).write(stamp_ns, values)
 
 
-def _reading(raw: bytes) -> tuple[int, Reading]:
+def _reading(raw: bytes) -> tuple[int, ZoneReading]:
     stamp_ns, range_m, variance_m2 = range_from_cdr(raw)
-    return stamp_ns, NOT_HEARD if range_m == math.inf else Reading(range_m, variance_m2)
+    return stamp_ns, NO_READING if range_m == math.inf else ZoneReading(range_m, variance_m2)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.quantities import CAB_SIGNALS, GIVE_UP
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
-from rail_msgs_py.table import figures_from_cdr
+from rail_msgs_py.table import values_from_cdr
 from rail_msgs_py.tap import raw_publish
 from rail_msgs_py.tick_node import TickNode
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
@@ -188,8 +188,8 @@ class WorldNode(TickNode[WorldParameters], name="world"):
             return
         travelled = self._traffic.travelled()
         for train, publish in self._odometers.items():
-            figures = np.array([self._wheels[train].count(1e-9 * stamp_ns, *travelled[train])])
-            publish(stamp_ns, figures)
+            values = np.array([self._wheels[train].count(1e-9 * stamp_ns, *travelled[train])])
+            publish(stamp_ns, values)
 
     def _publish_truth(self, stamp_ns: int) -> None:
         for publish, (name, track, chainage_m, speed_mps) in zip(
@@ -206,8 +206,8 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._advance()
 
     def _on_command(self, port: str, raw: bytes) -> None:
-        stamp_ns, figures = figures_from_cdr(raw, 1, len(COMMAND.columns))
-        permitted_mps, _, service_brake, emergency_brake = figures[0].tolist()
+        stamp_ns, values = values_from_cdr(raw, 1, len(COMMAND.columns))
+        permitted_mps, _, service_brake, emergency_brake = values[0].tolist()
         command = DriveCommand(
             permitted_mps if self._p.cab_signals else inf,
             service_brake=service_brake > 0.0,

@@ -48,7 +48,7 @@ def test_every_view_of_a_topic_is_put_into_words(view: type) -> None:
     [
         (Position(0, "train_a", "main", 7.0, float("inf"), 0.0, 0.0), "not known (last 7.0 m)"),
         (RangeReading(0, "zone1", float("nan"), 0.0, 0.0, 1.0), "zone1: disturbed"),
-        (RangeReading(0, "zone1", float("inf"), 0.0, 0.0, 1.0), "zone1: nothing heard"),
+        (RangeReading(0, "zone1", float("inf"), 0.0, 0.0, 1.0), "zone1: no signal"),
     ],
 )
 def test_what_is_not_known_is_said_to_be_so(message: Any, words: str) -> None:

@@ -29,7 +29,7 @@ from rail_corridor.figures.track_code import (
 )
 from rail_corridor.figures.track_code_errors import bound, chain_losses
 from rail_corridor.figures.train_bus import smallest_ohm
-from rail_corridor.plotting import Picture
+from rail_corridor.plotting import FigureSpec
 from rail_corridor.recording.mcap_file import RecordingFile
 from rail_corridor.report.from_recording import run_of
 from rail_signals.ranging.bounds import two_way_range_variance_bound
@@ -219,20 +219,20 @@ def test_message_errors_are_those_of_the_bound() -> None:
 
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - SLOW))
 def test_every_figure_is_drawn_and_says_what_its_axes_are(name: str, tmp_path: Path) -> None:
-    figures: list[Figure] = []
+    values: list[Figure] = []
 
     def drawing(figure: Figure) -> None:
         FIGURES[name].draw(figure)
-        figures.append(figure)
+        values.append(figure)
 
-    (path,) = draw(tmp_path / "pictures", {name: Picture(drawing, FIGURES[name].caption)})
+    (path,) = draw(tmp_path / "pictures", {name: FigureSpec(drawing, FIGURES[name].caption)})
     assert path.name == f"{name}.png"
     picture = matplotlib.image.imread(path)
     assert min(picture.shape[:2]) > 400
     assert picture[..., :3].std() > 0.01  # not blank
-    for axes in figures[0].axes:
+    for axes in values[0].axes:
         assert axes.get_ylabel() or axes.get_yticklabels()
-    assert figures[0].axes[-1].get_xlabel()
+    assert values[0].axes[-1].get_xlabel()
 
 
 def test_the_page_shows_every_figure(tmp_path: Path) -> None:
@@ -245,7 +245,7 @@ def test_figures_of_a_run(made_up: Callable[..., Any], tmp_path: Path) -> None:
     made.write()
     with RecordingFile(made.path) as file:
         run = run_of(file)
-    pictures = run_figures.pictures_of(run)
+    pictures = run_figures.figure_specs_of(run)
     assert set(pictures) == {"run_time_distance", "run_position_error", "run_handovers"}
     for path in draw(tmp_path, pictures):
         assert matplotlib.image.imread(path)[..., :3].std() > 0.01
@@ -266,7 +266,7 @@ def test_figures_of_a_run(made_up: Callable[..., Any], tmp_path: Path) -> None:
     [
         (("--list",), 0, "run_time_distance"),
         (("--only", "run_*"), 0, "not drawn: run_time_distance"),
-        (("--only", "nonsense"), 2, "rail: --only: 'nonsense': is none of"),
+        (("--only", "nonsense"), 2, "rail: --only: 'nonsense': is not one of"),
         (("--from", "missing.mcap"), 2, "missing.mcap"),
     ],
 )

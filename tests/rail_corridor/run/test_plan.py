@@ -11,7 +11,7 @@ import pytest
 from rail_corridor.equipment.ranging.calibration import transponders_of
 from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.equipment.ranging.nodes import CONTROLLER, MEDIUM
-from rail_corridor.equipment.ranging.world import reach_m, survey
+from rail_corridor.equipment.ranging.world import coverage_range_m, survey
 from rail_corridor.equipment.train_radio.nodes import CBTC_MEDIUM
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.loading.overrides import Overrides
@@ -145,7 +145,7 @@ def test_no_station_reaches_past_two_zones() -> None:
     for zone in layout.zones[:-2]:
         mast = layout.station(zone.station).position_m
         # Jeong et al., section 2.5: to the end of the next zone, and no further.
-        assert reach_m(scenario, layout, zone) == pytest.approx(
+        assert coverage_range_m(scenario, layout, zone) == pytest.approx(
             math.dist(mast, (zone.end_m + 200.0, 0.0, 0.0))
         )
 

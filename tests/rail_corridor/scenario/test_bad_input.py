@@ -170,7 +170,12 @@ WRONG: list[tuple[str, object, str, str]] = [
     ("radio", {"wrs_power_dbm": 1e3}, "radio.wrs_power_dbm", "60"),
     ("radio", {"oscillator_ppm": 1.0}, "radio.oscillator_ppm", "off by up to"),
     ("transponder", {"delay_s": -1e-6}, "transponder.delay_s", "greater than or equal"),
-    ("transponder", {"bench_bursts": 0}, "transponder.bench_bursts", "greater than or equal"),
+    (
+        "transponder",
+        {"calibration_bursts": 0},
+        "transponder.calibration_bursts",
+        "greater than or equal",
+    ),
     ("trains", [], "trains", "at least one train"),
     ("trains.0.name", "t2", "trains.1.name", "another train"),
     ("trains.0.name", "1st", "trains.0.name", "pattern"),

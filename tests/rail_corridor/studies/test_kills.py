@@ -14,7 +14,7 @@ from rail_corridor.equipment.train_radio.placement import bases_of
 from rail_corridor.errors import InputError
 from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.plan.plan import WORLD, make_plan
-from rail_corridor.run.kills import Executioner, Kill, check_kills, parse_kill
+from rail_corridor.run.kills import FaultInjector, Kill, check_kills, parse_kill
 from rail_corridor.studies.kill_scenarios import (
     DURATION_S,
     KINDS,
@@ -139,7 +139,7 @@ def test_what_cannot_be_killed_is_refused(node: str, one: bool, reason: str) -> 
 def test_each_is_killed_once_in_the_first_tick_that_is_due() -> None:
     dead: list[tuple[str, int]] = []
     now_ns = 0
-    executioner = Executioner(
+    executioner = FaultInjector(
         [Kill("b", 1.0), Kill("a", 0.3)], lambda name: dead.append((name, now_ns))
     )
     for now_ns in range(0, 2_000_000_000, 250_000_000):

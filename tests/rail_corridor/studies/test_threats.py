@@ -8,7 +8,7 @@ import pytest
 
 from rail_corridor.studies.threats import MAX_AGE_S, run_threat_campaign
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
-from rail_msgs_py.train_radio.safe_frame import Kind
+from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_world.train_radio.frame_threats import Threat
 
 FRAMES = 2000
@@ -59,7 +59,7 @@ def test_a_row_depends_on_its_seed_alone() -> None:
 def test_the_oracle_sees_a_missing_check(left_out: str, threat: Threat, fault: str) -> None:
     channel = weak(left_out)
 
-    def make(own: int, peer: int, kind: Kind, draw: Callable[[int], bytes]) -> SafeChannel:
+    def make(own: int, peer: int, kind: FrameKind, draw: Callable[[int], bytes]) -> SafeChannel:
         return channel(SECRET, own, peer, [kind], draw, max_age_s=MAX_AGE_S)
 
     (row,) = run_threat_campaign(FRAMES, [[threat]], make_end=make)
@@ -71,7 +71,7 @@ def test_nonces_alone_keep_out_what_was_recorded_before_a_restart(fixed: bool) -
     """Neither age nor, after a restart, numbers tell: without new nonces the oracle sees it."""
     channel = weak("_untimely")
 
-    def make(own: int, peer: int, kind: Kind, draw: Callable[[int], bytes]) -> SafeChannel:
+    def make(own: int, peer: int, kind: FrameKind, draw: Callable[[int], bytes]) -> SafeChannel:
         nonces = (lambda count: bytes([own]) * count) if fixed else draw
         return channel(SECRET, own, peer, [kind], nonces, max_age_s=MAX_AGE_S)
 

@@ -20,16 +20,16 @@ from rich.console import Console
 
 from rail_corridor.cli.studies import campaign
 from rail_corridor.studies import handover, kills, threat_table
-from rail_corridor.studies.handover import Row, print_rows
+from rail_corridor.studies.handover import HandoverRow, print_rows
 from rail_corridor.studies.handover_scenarios import Situation
 from rail_corridor.studies.kill_scenarios import DURATION_S, TICK_S, KillCase, draw_case
 from rail_corridor.studies.kills import KillRow, kill_campaign, row_of
 from rail_corridor.studies.link_margin.points import Point, aggregate
-from rail_corridor.studies.link_margin.theory import Prediction
+from rail_corridor.studies.link_margin.theory import LinkPrediction
 from rail_corridor.studies.threat_table import threat_campaign
 from rail_corridor.studies.threats import CampaignRow, run_threat_campaign
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
-from rail_msgs_py.train_radio.safe_frame import Kind
+from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.safe_result import Accepted, Opened
 
 from ..run_builder import RunBuilder
@@ -69,7 +69,7 @@ HANDOVER: dict[str, tuple[Callable[[], dict[str, Any]], dict[str, int]]] = {
 
 
 def test_a_good_run_violates_nothing() -> None:
-    row = Row(SITUATION)
+    row = HandoverRow(SITUATION)
     for _ in range(2):
         row.add(passing())
     assert (row.runs, row.crossings, row.made, row.violations) == (2, 2, 2, 0)
@@ -79,7 +79,7 @@ def test_a_good_run_violates_nothing() -> None:
 @pytest.mark.parametrize("what", HANDOVER)
 def test_what_must_not_happen_at_a_handover_is_counted(what: str) -> None:
     make, counts = HANDOVER[what]
-    row = Row(SITUATION)
+    row = HandoverRow(SITUATION)
     row.add(passing())
     row.add(make())
     row.add(make())
@@ -95,8 +95,8 @@ def test_what_must_not_happen_at_a_handover_is_counted(what: str) -> None:
 def test_the_handover_campaign_ends_with_its_verdict(
     monkeypatch: pytest.MonkeyPatch, what: str | None, code: int
 ) -> None:
-    def rows(*_: Any) -> Iterator[Row]:
-        row = Row(SITUATION)
+    def rows(*_: Any) -> Iterator[HandoverRow]:
+        row = HandoverRow(SITUATION)
         row.add(passing() if what is None else HANDOVER[what][0]())
         yield row
 
@@ -183,7 +183,7 @@ def test_the_kill_campaign_ends_with_its_verdict(
 
 
 def test_the_sweep_counts_ticks_past_an_end() -> None:
-    prediction = Prediction(12.0, 0.1, 0.2, 3.0)
+    prediction = LinkPrediction(12.0, 0.1, 0.2, 3.0)
     for change, count in ((lambda run: run, 0), (creeping, 2 * TICKS)):
         reports = [killed(change), killed(change)]
         assert aggregate(Point("mrc", 3.0), reports, prediction).passed_authority == count
@@ -206,15 +206,15 @@ class _Altering(SafeChannel):
         if self._what == "payload":
             return replace(opened, payload=bytes([opened.payload[0] ^ 1]) + opened.payload[1:])
         other = {
-            Kind.LOCATION_REPORT: Kind.MOVEMENT_AUTHORITY,
-            Kind.MOVEMENT_AUTHORITY: Kind.LOCATION_REPORT,
+            FrameKind.LOCATION_REPORT: FrameKind.MOVEMENT_AUTHORITY,
+            FrameKind.MOVEMENT_AUTHORITY: FrameKind.LOCATION_REPORT,
         }
         return replace(opened, kind=other[opened.kind])
 
 
 @pytest.mark.parametrize("what", ["payload", "kind"])
 def test_the_oracle_sees_other_content_than_was_sealed(what: str) -> None:
-    def make(own: int, peer: int, kind: Kind, draw: Callable[[int], bytes]) -> SafeChannel:
+    def make(own: int, peer: int, kind: FrameKind, draw: Callable[[int], bytes]) -> SafeChannel:
         return _Altering(what, bytes(range(32)), own, peer, [kind], draw)
 
     (row,) = run_threat_campaign(300, [[]], make_end=make)

@@ -19,10 +19,10 @@ from rail_corridor.view.live_state import LiveStateStore
 from rail_corridor.view.sensors import cards
 from rail_msgs_py.table import TableWriter
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
-from rail_msgs_py.topics.localizer import LOCALIZER_STATE, TOLD_POSITION
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE, RELAYED_RANGE
 from rail_msgs_py.topics.train_radio import REPORTS
 from rail_msgs_py.topics.world import SCENARIO, STATE
-from rail_signals.localizer.protection_level import Reason, Status
+from rail_signals.localizer.protection_level import ProtectionReason, Status
 from rail_signals.localizer.settings import Sensor
 
 TRAIN = "first"
@@ -50,10 +50,10 @@ def state(announced: bytes) -> LiveStateStore:
     return made
 
 
-def say(state: LiveStateStore, tick: int = 0, **figures: float) -> None:
+def say(state: LiveStateStore, tick: int = 0, **values: float) -> None:
     """Feed an answer; without a place if none is given."""
     nothing = {"front_m": math.nan, "low_m": -math.inf, "high_m": math.inf, "sigma_m": math.inf}
-    row = [float({**nothing, **figures}.get(column, 0.0)) for column in LOCALIZER_STATE.columns]
+    row = [float({**nothing, **values}.get(column, 0.0)) for column in LOCALIZER_STATE.columns]
     writer = TableWriter((TRAIN,), LOCALIZER_STATE.columns)
     state.feed(TOPIC, writer.write(tick * TICK_NS, np.array([row])), 0.3)
 
@@ -89,7 +89,7 @@ def test_an_interval_that_does_not_hold_the_train_is_told(
 
 def test_a_train_that_is_not_located_has_a_reason_and_no_place(state: LiveStateStore) -> None:
     excluded = (1 << Sensor.DOPPLER) + (1 << Sensor.ODOMETER)
-    say(state, status=Status.UNAVAILABLE, reason=Reason.TOO_WIDE, excluded=excluded)
+    say(state, status=Status.UNAVAILABLE, reason=ProtectionReason.TOO_WIDE, excluded=excluded)
     train, card = shown(state)
     assert (train["status"], train["reason"]) == ("unavailable", "too wide")
     assert train["left_out"] == ("doppler", "odometer")
@@ -137,13 +137,13 @@ def test_a_position_by_doppler_shifts_in_words(state: LiveStateStore) -> None:
 def test_a_position_that_is_told_later_is_held_against_the_truth_of_its_time(
     state: LiveStateStore,
 ) -> None:
-    topic = TOLD_POSITION.name(train=TRAIN)
+    topic = RELAYED_RANGE.name(train=TRAIN)
     told = {"time_s": 0.0, "position_m": 1000.2, "half_m": 0.8}
-    card = card_of(state, topic, TOLD_POSITION.columns, told)
+    card = card_of(state, topic, RELAYED_RANGE.columns, told)
     assert card["gauge"] == {"off_m": 0.2, "half_m": 0.8, "what": "bound"}
     assert ["position", "1000.20 ± 0.80", "m"] in card["rows"]
-    nothing = dict.fromkeys(TOLD_POSITION.columns, math.nan)
-    assert card_of(state, topic, TOLD_POSITION.columns, nothing)["rows"][0][1] == "none"
+    nothing = dict.fromkeys(RELAYED_RANGE.columns, math.nan)
+    assert card_of(state, topic, RELAYED_RANGE.columns, nothing)["rows"][0][1] == "none"
 
 
 def test_a_location_report_in_words(state: LiveStateStore) -> None:

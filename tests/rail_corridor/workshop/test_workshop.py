@@ -15,6 +15,7 @@ import pytest
 from rail_corridor.cli.main import main
 from rail_corridor.errors import InputError
 from rail_corridor.workshop.workshop import Workshop, diagnose
+from rail_signals.train_bus.bus_line import Termination
 from rail_signals.train_bus.cascade import input_reflection
 from rail_signals.train_bus.consist import Consist, Deviations
 from rail_signals.train_bus.fault_words import fault_words, size_of
@@ -25,7 +26,6 @@ from rail_signals.train_bus.faults import (
     OpenCircuit,
     WrongCable,
 )
-from rail_signals.train_bus.line import Termination
 from rail_signals.train_bus.profile import load_bus_profile
 from rail_signals.train_bus.tdr.measured_trace import step_edge
 from rail_signals.train_bus.tdr.reflectometer import Reflectogram, Reflectometer, measure_consist
@@ -159,7 +159,7 @@ def test_a_cable_whose_end_is_open_or_shorted_on_purpose(tmp_path: Path, end: st
 
 
 def test_touchstone_says_the_same_as_a_reflectometer(tmp_path: Path) -> None:
-    line = BadSplice(23.0, 20.0).apply(cable_consist("CM2").line())
+    line = BadSplice(23.0, 20.0).apply(cable_consist("CM2").bus_line())
     frequency_hz = 1e5 * np.arange(1, 1200)
     rho = input_reflection(line, frequency_hz, 50.0)
     path = tmp_path / "cable.s1p"

@@ -13,19 +13,25 @@ from rail_msgs_py.train_radio.safe_channel import SafeChannel
 from rail_msgs_py.train_radio.safe_frame import (
     FRAME_BYTES,
     DirectionKeys,
+    FrameKind,
     Header,
-    Kind,
     SafetyCode,
     payload_of,
     read_header,
     write_header,
 )
-from rail_msgs_py.train_radio.safe_result import Accepted, Greeted, Opened, Reason, Rejected
+from rail_msgs_py.train_radio.safe_result import (
+    Accepted,
+    Greeted,
+    Opened,
+    Rejected,
+    RejectionReason,
+)
 from rail_msgs_py.train_radio.train_channel import controller_end, train_end
 
 SECRET = b"a secret for the tests"
 CONTROLLER, TRAIN, OTHER_TRAIN = 1, 101, 102
-REPORT, AUTHORITY = Kind.LOCATION_REPORT, Kind.MOVEMENT_AUTHORITY
+REPORT, AUTHORITY = FrameKind.LOCATION_REPORT, FrameKind.MOVEMENT_AUTHORITY
 SECOND = 1_000_000_000
 
 
@@ -43,7 +49,7 @@ def greet(one: SafeChannel, other: SafeChannel, time_ns: int) -> None:
     assert one.established and other.established
 
 
-def kind_from(sender: SafeChannel) -> Kind:
+def kind_from(sender: SafeChannel) -> FrameKind:
     return AUTHORITY if sender.own == CONTROLLER else REPORT
 
 
@@ -55,7 +61,7 @@ def pair(skew_s: float = 0.0) -> tuple[SafeChannel, SafeChannel]:
     return controller, train
 
 
-def reason(opened: Opened) -> Reason:
+def reason(opened: Opened) -> RejectionReason:
     assert isinstance(opened, Rejected), opened
     return opened.reason
 
@@ -157,8 +163,8 @@ def test_repetition_and_order() -> None:
     controller, train = pair()
     frames = [train.seal(REPORT, bytes([n]), SECOND) for n in range(3)]
     assert isinstance(controller.open(frames[1], SECOND), Accepted)
-    assert reason(controller.open(frames[1], SECOND)) is Reason.REPEATED
-    assert reason(controller.open(frames[0], SECOND)) is Reason.OUT_OF_ORDER
+    assert reason(controller.open(frames[1], SECOND)) is RejectionReason.REPEATED
+    assert reason(controller.open(frames[0], SECOND)) is RejectionReason.OUT_OF_ORDER
     assert isinstance(controller.open(frames[2], SECOND), Accepted)
 
 
@@ -169,10 +175,10 @@ def test_age_counts_the_clock_skew_against_the_frame(skew_s: float) -> None:
     opened = controller.open(train.seal(REPORT, b"", SECOND), SECOND + limit_ns)
     assert isinstance(opened, Accepted) and opened.age_s == 1.0
     late = train.seal(REPORT, b"", SECOND)
-    assert reason(controller.open(late, SECOND + limit_ns + 1)) is Reason.TOO_OLD
+    assert reason(controller.open(late, SECOND + limit_ns + 1)) is RejectionReason.TOO_OLD
     early = train.seal(REPORT, b"", 2 * SECOND)
     before_ns = 2 * SECOND - round(skew_s * SECOND)
-    assert reason(controller.open(early, before_ns - 1)) is Reason.FROM_THE_FUTURE
+    assert reason(controller.open(early, before_ns - 1)) is RejectionReason.FROM_THE_FUTURE
     assert isinstance(controller.open(early, before_ns), Accepted)
 
 
@@ -182,22 +188,24 @@ def test_wrong_train_wrong_way_wrong_kind_and_wrong_key() -> None:
     other_train = end(OTHER_TRAIN, CONTROLLER, 5)
     greet(other_train, other_end, 0)
     authority = controller.seal(AUTHORITY, b"go", SECOND)
-    assert reason(other_train.open(authority, SECOND)) is Reason.WRONG_ADDRESS
-    assert reason(controller.open(authority, SECOND)) is Reason.UNEXPECTED_KIND
+    assert reason(other_train.open(authority, SECOND)) is RejectionReason.WRONG_ADDRESS
+    assert reason(controller.open(authority, SECOND)) is RejectionReason.UNEXPECTED_KIND
     readdressed = (
         write_header(read_header(authority)._replace(destination=OTHER_TRAIN)) + authority[24:]
     )
-    assert reason(other_train.open(readdressed, SECOND)) is Reason.UNKNOWN_SESSION
+    assert reason(other_train.open(readdressed, SECOND)) is RejectionReason.UNKNOWN_SESSION
     report = train.seal(REPORT, b"", SECOND)
     forged = SafetyCode(bytes(16)).seal(read_header(report), payload_of(report))
-    assert reason(controller.open(forged, SECOND)) is Reason.SAFETY_CODE
+    assert reason(controller.open(forged, SECOND)) is RejectionReason.SAFETY_CODE
     greeting = end(TRAIN, CONTROLLER, 6).seal(REPORT, b"", SECOND)
-    assert reason(end(TRAIN, CONTROLLER, 7).open(greeting, SECOND)) is Reason.WRONG_ADDRESS
+    assert reason(end(TRAIN, CONTROLLER, 7).open(greeting, SECOND)) is RejectionReason.WRONG_ADDRESS
 
 
 def test_what_is_thrown_back_at_its_sender_has_another_key() -> None:
-    secret, nonces = bytes(range(32)), (bytes(16), bytes([1]) * 16)
-    there, back, other = (DirectionKeys(secret, *ends) for ends in ((1, 2), (2, 1), (1, 3)))
+    authentication_key, nonces = bytes(range(32)), (bytes(16), bytes([1]) * 16)
+    there, back, other = (
+        DirectionKeys(authentication_key, *ends) for ends in ((1, 2), (2, 1), (1, 3))
+    )
     for keys in (back, other):
         assert keys.greeting.of(b"hello") != there.greeting.of(b"hello")
         assert keys.session(*nonces).code.of(b"hello") != there.session(*nonces).code.of(b"hello")
@@ -205,24 +213,27 @@ def test_what_is_thrown_back_at_its_sender_has_another_key() -> None:
     greeting = train.seal(REPORT, b"", SECOND)
     header = read_header(greeting)._replace(source=CONTROLLER, destination=TRAIN)
     mirrored = write_header(header) + greeting[24:]
-    assert reason(train.open(mirrored, SECOND)) is Reason.SAFETY_CODE
+    assert reason(train.open(mirrored, SECOND)) is RejectionReason.SAFETY_CODE
 
 
 @pytest.mark.parametrize(("tick_s", "oldest_s"), [(0.25, 1.0), (0.1, 1.0), (0.5, 1.5)])
 def test_frames_of_trains_may_be_three_ticks_old_or_a_second(
     tick_s: float, oldest_s: float
 ) -> None:
-    secret, down = "00" * 16, Kind.MOVEMENT_AUTHORITY
+    authentication_key, down = "00" * 16, FrameKind.MOVEMENT_AUTHORITY
     for late_ns, taken in ((0, True), (1000, False)):
-        controller, train = controller_end(secret, 1, 7, tick_s), train_end(secret, 1, 7, tick_s)
+        controller, train = (
+            controller_end(authentication_key, 1, 7, tick_s),
+            train_end(authentication_key, 1, 7, tick_s),
+        )
         train.open(controller.seal(down, b"", 0), 0)
-        controller.open(train.seal(Kind.LOCATION_REPORT, b"", 0), 0)
+        controller.open(train.seal(FrameKind.LOCATION_REPORT, b"", 0), 0)
         frame = controller.seal(down, b"go", SECOND)
         opened = train.open(frame, SECOND + round(oldest_s * 1e9) + late_ns)
         if taken:
             assert isinstance(opened, Accepted)
         else:
-            assert opened == Rejected(Reason.TOO_OLD)
+            assert opened == Rejected(RejectionReason.TOO_OLD)
 
 
 def test_a_receiver_that_restarted_takes_nothing_recorded_before() -> None:
@@ -231,10 +242,10 @@ def test_a_receiver_that_restarted_takes_nothing_recorded_before() -> None:
     recorded = [train.seal(REPORT, bytes([n]), SECOND) for n in range(5)]
     controller = end(CONTROLLER, TRAIN, 8)
     for frame in recorded:
-        assert reason(controller.open(frame, SECOND)) is Reason.UNKNOWN_SESSION
+        assert reason(controller.open(frame, SECOND)) is RejectionReason.UNKNOWN_SESSION
     greet(controller, train, SECOND)
     for frame in recorded:
-        assert reason(controller.open(frame, SECOND)) is Reason.UNKNOWN_SESSION
+        assert reason(controller.open(frame, SECOND)) is RejectionReason.UNKNOWN_SESSION
 
 
 def test_frames_of_a_sender_from_before_its_restart_are_of_no_use() -> None:
@@ -244,7 +255,7 @@ def test_frames_of_a_sender_from_before_its_restart_are_of_no_use() -> None:
     train = end(TRAIN, CONTROLLER, 9)
     greet(train, controller, SECOND + 1000)
     for frame in recorded:
-        assert reason(controller.open(frame, SECOND + 1000)) is Reason.UNKNOWN_SESSION
+        assert reason(controller.open(frame, SECOND + 1000)) is RejectionReason.UNKNOWN_SESSION
 
 
 def test_recorded_greetings_neither_make_nor_cut_a_session() -> None:
@@ -255,8 +266,8 @@ def test_recorded_greetings_neither_make_nor_cut_a_session() -> None:
     answer = controller.seal(AUTHORITY, b"", 0)
     assert train.open(answer, 0) == Greeted(True)
     assert isinstance(controller.open(train.seal(REPORT, b"", 0), 0), Accepted)
-    assert reason(controller.open(first, 0)) is Reason.REPEATED
-    assert reason(train.open(answer, 0)) is Reason.REPEATED
+    assert reason(controller.open(first, 0)) is RejectionReason.REPEATED
+    assert reason(train.open(answer, 0)) is RejectionReason.REPEATED
     # A restarted end has forgotten them, and still they prove nothing to it.
     controller = end(CONTROLLER, TRAIN, 3)
     assert controller.open(first, 0) == Greeted(False)
@@ -274,14 +285,14 @@ def test_answers_leave_every_other_frame_to_data() -> None:
         greeting = end(TRAIN, CONTROLLER, 20 + n).seal(REPORT, b"", n * SECOND)
         assert controller.open(greeting, n * SECOND) == Greeted(False)
         kinds.append(read_header(controller.seal(AUTHORITY, b"", n * SECOND // 2)).kind)
-    assert kinds == [Kind.GREETING, AUTHORITY] * 3
+    assert kinds == [FrameKind.GREETING, AUTHORITY] * 3
     assert train.established
 
 
 def test_a_session_is_given_up_after_silence() -> None:
     controller, _ = pair()
     assert read_header(controller.seal(AUTHORITY, b"", 5 * SECOND)).kind == AUTHORITY
-    assert read_header(controller.seal(AUTHORITY, b"", 5 * SECOND + 1)).kind == Kind.GREETING
+    assert read_header(controller.seal(AUTHORITY, b"", 5 * SECOND + 1)).kind == FrameKind.GREETING
     assert not controller.established
 
 
@@ -335,7 +346,7 @@ def test_bad_arguments_are_quoted() -> None:
         SafeChannel(SECRET, 1, 5, [REPORT], draw, session_timeout_s=0.5)
     channel = SafeChannel(SECRET, 1, 5, [REPORT], draw)
     with pytest.raises(ValueError, match="got GREETING"):
-        channel.seal(Kind.GREETING, b"", 0)
+        channel.seal(FrameKind.GREETING, b"", 0)
     with pytest.raises(ValueError, match="at most 32 bytes, got 33"):
         channel.seal(REPORT, bytes(33), 0)
     with pytest.raises(ValueError, match=r"time_ns .* got -1"):
@@ -345,16 +356,16 @@ def test_bad_arguments_are_quoted() -> None:
 @pytest.mark.parametrize("restarts", [0, 1, 2])
 def test_a_train_that_is_switched_on_anew_draws_other_nonces(restarts: int) -> None:
     """With those of before its greetings are taken for old ones of the session it has lost."""
-    secret, tick_s = "00" * 16, 0.25
-    up, down = Kind.LOCATION_REPORT, Kind.MOVEMENT_AUTHORITY
-    controller = controller_end(secret, 1, 7, tick_s)
-    before = train_end(secret, 1, 7, tick_s)
+    authentication_key, tick_s = "00" * 16, 0.25
+    up, down = FrameKind.LOCATION_REPORT, FrameKind.MOVEMENT_AUTHORITY
+    controller = controller_end(authentication_key, 1, 7, tick_s)
+    before = train_end(authentication_key, 1, 7, tick_s)
     before.open(controller.seal(down, b"", 0), 0)
     controller.open(before.seal(up, b"", 0), 0)
     assert controller.established
     assert isinstance(before.open(controller.seal(down, b"", 0), 0), Accepted)
-    anew = train_end(secret, 1, 7, tick_s, restarts)
+    anew = train_end(authentication_key, 1, 7, tick_s, restarts)
     assert controller.open(anew.seal(up, b"", 10**6), 10**6) == Greeted(False)
     answer = anew.open(controller.seal(down, b"", 10**6), 10**6)
-    lost = Rejected(Reason.UNKNOWN_SESSION)
+    lost = Rejected(RejectionReason.UNKNOWN_SESSION)
     assert answer == (Greeted(True) if restarts else lost)

@@ -8,7 +8,7 @@ import pytest
 from rail_onboard.doppler.positioner import DopplerPositioner, Tracking
 from rail_signals.doppler.receiver import ToneReceiver
 from rail_signals.doppler.signal import block_times_s, received_tones
-from rail_signals.doppler.solver import DopplerSolver, Reason
+from rail_signals.doppler.solver import DopplerSolver, NoFixReason
 from rail_signals.doppler.surveyed_line import SurveyedLine
 from rail_signals.doppler.tone_plan import TonePlan
 
@@ -43,7 +43,7 @@ def test_a_train_is_followed_past_stations_that_share_a_tone() -> None:
     for tick in ticks:
         s = 300.0 + SPEED_MPS * TICK_S * tick
         answer = mine.locate(block_at(s, rng), 4 * TICK_S)
-        if answer.reason is Reason.NONE:
+        if answer.reason is NoFixReason.NONE:
             assert answer.fix is not None
             known += 1
             errors.append((answer.fix.chainage_m - s) / answer.fix.sigma_m)
@@ -56,10 +56,10 @@ def test_a_train_is_followed_past_stations_that_share_a_tone() -> None:
 
 def test_silence_and_rubbish_are_no_position_and_the_train_is_found_again() -> None:
     rng, mine = np.random.default_rng(4), positioner(1390.0)
-    assert mine.locate(None, 0.0).reason is Reason.TOO_FEW_STATIONS
+    assert mine.locate(None, 0.0).reason is NoFixReason.TOO_FEW_STATIONS
     assert mine.locate(np.full(PLAN.samples, np.nan, dtype=complex), 0.1).fix is None
     noise = rng.normal(size=(PLAN.samples, 2)).view(np.complex128)[:, 0]
-    assert mine.locate(noise, 0.1).reason is Reason.TOO_FEW_STATIONS
+    assert mine.locate(noise, 0.1).reason is NoFixReason.TOO_FEW_STATIONS
     found = mine.locate(block_at(1400.0, rng), 0.1)
     assert found.fix is not None and found.fix.chainage_m == pytest.approx(1400.0, abs=1.0)
 

@@ -40,7 +40,7 @@ class Line:
         carriers_hz = np.array([radio.carriers_hz[a.downlink_channel] for a in stations])
         loss_db = 20.0 * np.log10(4.0 * math.pi * carriers_hz / C_MPS)
         level_dbm = scenario.radio.wrs_power_dbm + paths.gain_db - loss_db[:, None]
-        heard = paths.in_reach & (level_dbm > 10.0 * math.log10(medium.noise_mw))
+        heard = paths.in_coverage & (level_dbm > 10.0 * math.log10(medium.noise_mw))
         channels = np.array([a.downlink_channel for a in stations])
         self.levels: list[dict[int, float]] = []
         for place in range(count):

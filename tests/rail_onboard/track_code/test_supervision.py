@@ -320,7 +320,7 @@ def test_a_step_back_in_time_forgets_everything() -> None:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: CodeSupervision(braking_mps2=0.0),
+        lambda: CodeSupervision(guaranteed_service_mps2=0.0),
         lambda: CodeSupervision(odometer_error=-0.1),
         lambda: Thresholds(warn_over_mps=1.0),
         lambda: Thresholds(trip_kmh=((80.0, 70.0),)),
@@ -399,7 +399,7 @@ class Line:
             at += block.length_m
             ends.append(at)
         codes = CodeLogic(self.blocks, braking_mps2=self.braking_mps2).all_fields(self.occupied)
-        supervision = CodeSupervision(braking_mps2=self.braking_mps2)
+        supervision = CodeSupervision(guaranteed_service_mps2=self.braking_mps2)
         brake = deque([True] * (round(DELAYS.brake_s / TICK_S) - 1))
         x = v = 0.0
         index, since_s = 0, 0.0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rail_msgs_py.topics.train_bus import BUS_LINK
 from rail_onboard.train_bus.message import NONE, PATTERN, PAYLOAD_BYTES, BusMessage, pattern_errors
 from rail_onboard.train_bus.terminal import BusTerminal
-from rail_signals.train_bus.receiver import NOT_FOUND, ReceivedFrame
+from rail_signals.train_bus.receiver import NOT_DETECTED, ReceivedFrame
 
 TICK_S = 0.25
 
@@ -71,7 +71,7 @@ def test_wrong_bits_of_the_pattern_are_counted() -> None:
 
 
 def named(terminal: BusTerminal, tick: int) -> dict[str, float]:
-    return dict(zip(BUS_LINK.columns, terminal.figures(tick), strict=True))
+    return dict(zip(BUS_LINK.columns, terminal.link_values(tick), strict=True))
 
 
 def test_head_and_tail_confirm_each_other() -> None:
@@ -95,7 +95,7 @@ def test_the_end_of_the_train_is_not_confirmed_by_a_tail_that_hears_nothing() ->
     for tick in range(8):
         up = tail.payload(tick)
         head.take(tick, frame(up))
-        tail.take(tick, NOT_FOUND)
+        tail.take(tick, NOT_DETECTED)
     assert head.lost == 0
     assert not head.is_confirmed(7)
     assert math.isinf(head.age_s(7))
@@ -108,7 +108,7 @@ def test_what_is_lost_is_counted_and_confirmation_ages() -> None:
         down, up = head.payload(tick), tail.payload(tick)
         gone = tick >= 4
         head.take(tick, frame(up, flips=3 if gone else 0))
-        tail.take(tick, NOT_FOUND if gone else frame(down))
+        tail.take(tick, NOT_DETECTED if gone else frame(down))
         assert head.is_confirmed(tick) == (1 <= tick <= 6)
         assert head.loses(tick) == gone
     found = named(head, 11)

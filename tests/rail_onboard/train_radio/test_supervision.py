@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rail_onboard.braking_curve import GuaranteedBraking
 from rail_onboard.track_code.supervision import STANDSTILL_MPS, SupervisionOutput, Thresholds
-from rail_onboard.train_radio.supervision import Authority, AuthoritySupervision
+from rail_onboard.train_radio.supervision import AuthoritySupervision, ReceivedAuthority
 from rail_onboard.train_radio.train_location import NOWHERE, Location, TrainLocation
 
 LENGTH_M = 100.0
@@ -21,14 +21,14 @@ MARGIN_M = 10.0
 LIMITS = Thresholds()
 OVER = LIMITS.service_over_mps
 BRAKING = GuaranteedBraking()
-FAR = Authority(0.0, 5000.0, 20.0)
+FAR = ReceivedAuthority(0.0, 5000.0, 20.0)
 
 
 def at(front_m: float, uncertainty_m: float = 0.0) -> Location:
     return Location(front_m, uncertainty_m, True)
 
 
-def permitted(authority: Authority, location: Location, direction: int = 1) -> float:
+def permitted(authority: ReceivedAuthority, location: Location, direction: int = 1) -> float:
     supervision = AuthoritySupervision(LENGTH_M, direction=direction, margin_m=MARGIN_M)
     return supervision.update(0.0, location, 0.0, authority=authority).permitted_mps
 
@@ -46,7 +46,7 @@ class Ride:
         self,
         speed_mps: float = 0.0,
         location: Location = at(0.0),  # noqa: B008
-        authority: Authority | None = FAR,
+        authority: ReceivedAuthority | None = FAR,
         *,
         after_s: float = 0.5,
         age_s: float = 0.0,
@@ -89,7 +89,7 @@ def test_the_permitted_speed_is_continuous_and_zero_from_the_margin_on() -> None
 @pytest.mark.parametrize("direction", [1, -1])
 def test_the_limits_under_the_whole_train_and_the_curve_to_the_next_one(direction: int) -> None:
     steps = ((direction * 1000.0, 10.0), (direction * 1500.0, 30.0))
-    authority = Authority(0.0, direction * 9000.0, 25.0, steps)
+    authority = ReceivedAuthority(0.0, direction * 9000.0, 25.0, steps)
 
     def at_s(s: float) -> float:
         return permitted(authority, at(direction * s, 5.0), direction)
@@ -138,7 +138,7 @@ def test_the_emergency_brake_is_released_at_a_stand_only() -> None:
 
 
 def test_the_emergency_curve_to_the_end_itself() -> None:
-    limit = Authority(0.0, 1000.0, 3.0)
+    limit = ReceivedAuthority(0.0, 1000.0, 3.0)
     needed_m = 3.0 + 0.25 + 3.5**2 / 1.8
     late = Thresholds(emergency_over_mps=99.0)  # leaves the curve alone
     for short_m, expected in ((-0.01, False), (0.01, True)):
@@ -275,10 +275,10 @@ def test_a_step_back_in_time_forgets_everything() -> None:
         lambda: GuaranteedBraking(fall_permil=70.0),
         lambda: GuaranteedBraking(delay_s=math.nan),
         lambda: GuaranteedBraking(speed_error=1.0),
-        lambda: Authority(math.nan, 0.0, 1.0),
-        lambda: Authority(0.0, 0.0, -1.0),
-        lambda: Authority(0.0, 0.0, 1.0, ((math.inf, 1.0),)),
-        lambda: Authority(0.0, 0.0, 1.0, validity_s=math.nan),
+        lambda: ReceivedAuthority(math.nan, 0.0, 1.0),
+        lambda: ReceivedAuthority(0.0, 0.0, -1.0),
+        lambda: ReceivedAuthority(0.0, 0.0, 1.0, ((math.inf, 1.0),)),
+        lambda: ReceivedAuthority(0.0, 0.0, 1.0, validity_s=math.nan),
     ],
 )
 def test_bad_parameters_are_refused(make: object) -> None:
@@ -344,7 +344,7 @@ class Train:
     def supervise(self, end_s: float | None, limit_mps: float = 25.0) -> SupervisionOutput:
         authority = None
         if end_s is not None:
-            authority = Authority(self.time_s, self.direction * end_s, limit_mps)
+            authority = ReceivedAuthority(self.time_s, self.direction * end_s, limit_mps)
         here = self.where.location(self.time_s)
         return self.supervision.update(self.time_s, here, self.measured_mps, authority=authority)
 
@@ -427,7 +427,7 @@ def test_no_train_passes_the_end_of_its_authority(
     probe = AuthoritySupervision(
         LENGTH_M, direction=direction, margin_m=train.margin_m, braking=braking
     )
-    first = Authority(0.0, direction * end_s, 25.0)
+    first = ReceivedAuthority(0.0, direction * end_s, 25.0)
     allowed = probe.update(0.0, train.where.location(0.0), 0.0, authority=first)
     train.v = share * allowed.permitted_mps * (1.0 + wheels)
     script = [kind for kind, ticks in events for _ in range(ticks)]

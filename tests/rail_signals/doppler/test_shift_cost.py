@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.doppler.shift_cost import Heard, ShiftCost, Unknowns, inverse
+from rail_signals.doppler.shift_cost import ReceivedShift, ShiftCost, Unknowns, inverse
 from rail_signals.doppler.surveyed_line import SurveyedLine
 from rail_signals.doppler.tone_plan import TonePlan
 
@@ -24,7 +24,7 @@ def cost_of(noise_hz: np.ndarray) -> ShiftCost:
     rate = line.rates(STATIONS, [at - way, at + way]).mean(axis=0)
     shift = per_mps * v * rate + delta + noise_hz
     heard = [
-        Heard(*station, float(z), 4.0, per_mps, 1.0)
+        ReceivedShift(*station, float(z), 4.0, per_mps, 1.0)
         for station, z in zip(STATIONS.tolist(), shift, strict=True)
     ]
     return ShiftCost(line, heard, PLAN.averaging_time_s, (40.0, 1e-4), (0.0, 1e-6))

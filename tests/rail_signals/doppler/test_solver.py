@@ -13,7 +13,7 @@ from rail_signals.doppler.bound import (
     shift_variance_hz2,
     tracked_bound_m,
 )
-from rail_signals.doppler.solver import Answer, DopplerSolver, Prior, Reason, speed_from_shift
+from rail_signals.doppler.solver import Answer, DopplerSolver, NoFixReason, Prior, speed_from_shift
 from rail_signals.doppler.surveyed_line import SurveyedLine
 from rail_signals.doppler.tone_plan import TonePlan
 from rail_world.line.alignment import Alignment, Element
@@ -82,7 +82,7 @@ class Setting:
             np.array([s]),
             v,
             variance[None],
-            reach_m=REACH_M,
+            coverage_range_m=REACH_M,
             offset_sigma_hz=1e-6 * PLAN.max_offset_ppm * PLAN.carrier_hz,
             speed_sigma_mps=2.0 * PLAN.max_speed_mps,
         )
@@ -139,13 +139,13 @@ def test_why_there_is_no_position() -> None:
     rng = np.random.default_rng(1)
     stations, shift, variance = setting.shifts(1700.0, 30.0, 0.0, 1e3, rng)
     one = setting.solver.solve(stations[:1], shift[:1], variance[:1])
-    assert one == Answer(Reason.TOO_FEW_STATIONS)
-    assert solved(setting, 1700.0, 0.0).reason is Reason.STANDSTILL
+    assert one == Answer(NoFixReason.TOO_FEW_STATIONS)
+    assert solved(setting, 1700.0, 0.0).reason is NoFixReason.STANDSTILL
     broken = shift + np.where(np.arange(shift.size) == 2, 300.0, 0.0)
     window = (1300.0, 2100.0)
     wrong = setting.solver.solve(stations, broken, variance, window_m=window, direction=1)
     assert wrong.fix is None
-    assert wrong.reason in (Reason.INCONSISTENT, Reason.OFF_TRACK, Reason.GEOMETRY)
+    assert wrong.reason in (NoFixReason.INCONSISTENT, NoFixReason.OFF_TRACK, NoFixReason.GEOMETRY)
     outside = solved(setting, 1700.0, 30.0, window_m=(2000.0, 2300.0), direction=1)
     assert outside.fix is None
     few = setting.solver.solve(stations[:2], shift[:2], variance[:2], direction=1)
@@ -176,12 +176,12 @@ def test_the_bound_is_that_of_the_documents_example() -> None:
     s = np.arange(-1000.0, 1001.0, 5.0)
     line = SurveyedLine(s, s, 0.0 * s, 0.0 * s, 0.0 * s)
     wanted = {50.0: (49.7, 12.4, 1.04), 100.0: (13.0, 3.55, 0.48), 10.0: (1224.0, 295.0, 19.8)}
-    for aside_m, figures in wanted.items():
+    for aside_m, values in wanted.items():
         stations = [[-500.0, aside_m, 0.0], [500.0, aside_m, 0.0]]
         bound = position_bound_m(
             PLAN, line, stations, [0.0, 250.0, 400.0], 300.0 / 3.6, 1.0, offset_sigma_hz=0.0
         )
-        np.testing.assert_allclose(bound, figures, rtol=5e-3)
+        np.testing.assert_allclose(bound, values, rtol=5e-3)
 
 
 def test_two_stations_and_an_unknown_offset_bound_nothing() -> None:

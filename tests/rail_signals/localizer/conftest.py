@@ -15,14 +15,14 @@ from rail_signals.localizer.readings import (
     BlockEntry,
     DopplerFix,
     RangeFix,
-    TickReadings,
+    TickMeasurements,
     WheelSpeed,
 )
 from rail_signals.localizer.settings import LocalizerSettings, Sensor
 
 DEFAULT = LocalizerSettings()
 TICK_S = 0.1
-#: Of a tick, by the names of `TickReadings`.
+#: Of a tick, by the names of `TickMeasurements`.
 Readings: TypeAlias = dict[str, Any]
 
 
@@ -82,7 +82,7 @@ class Trip:
                 readings["block"] = BlockEntry(joint_m, 0.0)
             if falsify is not None:
                 falsify(readings)
-            estimate = self.localizer.tick(now_s, TickReadings(**readings))
+            estimate = self.localizer.tick(now_s, TickMeasurements(**readings))
             self.history.append(Localization.of(estimate))
         return self.history[-1]
 

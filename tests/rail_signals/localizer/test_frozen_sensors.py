@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rail_signals.localizer.protection_level import Reason, Status
+from rail_signals.localizer.protection_level import ProtectionReason, Status
 from rail_signals.localizer.screening import Rejection
 from rail_signals.localizer.settings import IntegrityClaim, LocalizerSettings, Sensor
 
@@ -41,7 +41,7 @@ def test_a_range_frozen_at_a_stand_is_no_evidence(new_trip: Any) -> None:
     later = trip.history[-600:]
     assert all(h.status is Status.UNMONITORED for h in later)
     assert all(h.uncovered == {Sensor.ODOMETER} for h in later)
-    assert here.reason is Reason.TOO_FEW_SENSORS
+    assert here.reason is ProtectionReason.TOO_FEW_SENSORS
     # All but the first few, which might have been chance.
     rejected = round((LOST_WITHIN_S + 60.0) / trip.tick_s) - (DEFAULT.claim.most_alike - 1)
     assert trip.localizer.rejections == {(Sensor.RANGE, Rejection.FROZEN): rejected}
@@ -95,7 +95,7 @@ def test_wheels_frozen_at_zero_are_found_when_the_train_starts(new_trip: Any) ->
     """At a stand zero is what they report; rolling, range and Doppler fixes say otherwise."""
     trip = new_trip(speed_mps=0.0).place()
     freeze = frozen("odometer", speed_mps=0.0)
-    assert not trip.run(60.0, freeze).found
+    assert not trip.run(60.0, freeze).detected
     assert all(h.status is Status.PROTECTED for h in trip.history)
     for speed_mps in np.linspace(0.0, 15.0, 200).tolist():
         trip.speed_mps = speed_mps
@@ -110,7 +110,7 @@ def test_wheels_frozen_at_a_speed_are_found_when_the_train_brakes(new_trip: Any)
     trip = new_trip(speed_mps=20.0).place()
     trip.run(20.0)
     freeze = frozen("odometer", speed_mps=20.1)
-    assert not trip.run(20.0, freeze).found
+    assert not trip.run(20.0, freeze).detected
     for speed_mps in np.linspace(20.0, 8.0, 150).tolist():
         trip.speed_mps = speed_mps
         assert trip.holds(trip.run(trip.tick_s, freeze))

@@ -20,8 +20,13 @@ from rail_signals.localizer.filter_bank import (
 )
 from rail_signals.localizer.integrity_monitor import IntegrityMonitor
 from rail_signals.localizer.localizer import Localizer
-from rail_signals.localizer.protection_level import Estimate, ProtectionLevels, Reason, Status
-from rail_signals.localizer.readings import TickReadings
+from rail_signals.localizer.protection_level import (
+    Estimate,
+    ProtectionLevels,
+    ProtectionReason,
+    Status,
+)
+from rail_signals.localizer.readings import TickMeasurements
 from rail_signals.localizer.settings import IntegrityClaim, LocalizerSettings, Sensor
 from rail_signals.localizer.study.simulation import SimulatedLine, SimulatedMotion, SimulatedSensors
 
@@ -78,7 +83,7 @@ def test_a_filter_of_no_use_leaves_its_sensor_uncovered() -> None:
     bank = bank_at()
     bank.variances[S, 1 + Sensor.RANGE] = 500.0**2
     here = judged(bank)
-    assert (here.status, here.reason) == (Status.UNMONITORED, Reason.TOO_FEW_SENSORS)
+    assert (here.status, here.reason) == (Status.UNMONITORED, ProtectionReason.TOO_FEW_SENSORS)
     assert np.flatnonzero(here.uncovered).tolist() == [Sensor.RANGE]
     assert here.protection_m == pytest.approx(1.5 * K)
 
@@ -90,7 +95,7 @@ def test_hypotheses_wide_apart_are_too_wide_together() -> None:
     bank.x[S, 1] = 60.0
     bank.variances[S, 5:] = 45.0**2
     here = judged(bank)
-    assert (here.status, here.reason) == (Status.UNAVAILABLE, Reason.TOO_WIDE)
+    assert (here.status, here.reason) == (Status.UNAVAILABLE, ProtectionReason.TOO_WIDE)
     assert np.isinf(here.protection_m)
     assert np.isnan(here.position_m)
 
@@ -103,7 +108,7 @@ def test_a_separation_is_held_against_the_variance_gained() -> None:
         for index, left_out in enumerate(FILTERS):
             if Sensor.RANGE in left_out:
                 bank.x[S, index] = factor * threshold * gained_m
-        assert bool(judged(bank).found) is found
+        assert bool(judged(bank).detected) is found
 
 
 def test_the_only_hypothesis_left_names_the_sensor() -> None:
@@ -111,7 +116,7 @@ def test_the_only_hypothesis_left_names_the_sensor() -> None:
     off = {left_out: 40.0 for left_out in FILTERS if Sensor.RANGE not in left_out}
     bank, monitor = bank_at(off), IntegrityMonitor(CLAIM)
     here = judged(bank, monitor)
-    assert here.found
+    assert here.detected
     assert np.flatnonzero(here.excluded).tolist() == [Sensor.RANGE]
     assert here.position_m == 0.0
     assert here.protection_m == pytest.approx(2.0 * K)
@@ -136,7 +141,7 @@ def test_two_hypotheses_left_are_both_held() -> None:
     bank.lose()
     monitor = IntegrityMonitor(CLAIM)
     here = judged(bank, monitor)
-    assert here.found
+    assert here.detected
     assert not here.excluded.any()
     assert here.low_m == pytest.approx(-1.5 * K)
     assert here.high_m == pytest.approx(40.0 + 2.0 * K)
@@ -144,7 +149,7 @@ def test_two_hypotheses_left_are_both_held() -> None:
     # Once one of the two is of no use nothing can be said.
     bank.variances[S, 1 + Sensor.RANGE] = 100.0**2
     here = judged(bank, monitor)
-    assert (here.status, here.reason) == (Status.UNAVAILABLE, Reason.AMBIGUOUS)
+    assert (here.status, here.reason) == (Status.UNAVAILABLE, ProtectionReason.AMBIGUOUS)
 
 
 def test_an_impossible_scale_of_the_wheels_is_their_fault() -> None:
@@ -167,9 +172,9 @@ def test_speeds_are_claimed_in_the_same_way() -> None:
 def test_an_estimate_stays_as_it_was() -> None:
     localizer = Localizer(SETTINGS, (2,))
     localizer.place(np.zeros((2, 1)), 1.0, speed_mps=10.0)
-    estimate = localizer.tick(0.0, TickReadings())
+    estimate = localizer.tick(0.0, TickMeasurements())
     before = estimate.position_m.copy()
-    localizer.tick(1.0, TickReadings())
+    localizer.tick(1.0, TickMeasurements())
     np.testing.assert_array_equal(estimate.position_m, before)
 
 

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 
 from rail_signals.localizer.localizer import Localizer
-from rail_signals.localizer.protection_level import Localization, Reason, Status
+from rail_signals.localizer.protection_level import Localization, ProtectionReason, Status
 from rail_signals.localizer.readings import (
-    TickReadings,
+    TickMeasurements,
 )
 from rail_signals.localizer.settings import IntegrityClaim, LocalizerSettings, OdometerModel, Sensor
 
 DEFAULT = LocalizerSettings()
 TICK_S = 0.1
-#: Of a tick, by the names of `TickReadings`.
+#: Of a tick, by the names of `TickMeasurements`.
 Readings: TypeAlias = dict[str, Any]
 
 
 def located(localizer: Localizer, time_s: float, **readings: Any) -> Localization:
     """Return what a localizer says of a tick."""
-    return Localization.of(localizer.tick(time_s, TickReadings(**readings)))
+    return Localization.of(localizer.tick(time_s, TickMeasurements(**readings)))
 
 
 def shifted(sensor: str, by: Callable[[], float] | float) -> Callable[[Readings], None]:
@@ -44,7 +44,7 @@ def shifted(sensor: str, by: Callable[[], float] | float) -> Callable[[Readings]
 def test_before_the_first_fix_there_is_no_position(new_trip: Any) -> None:
     trip = new_trip(sensors=frozenset({Sensor.ODOMETER}))
     here = trip.run(5.0)
-    assert (here.status, here.reason) == (Status.UNAVAILABLE, Reason.NO_FIX)
+    assert (here.status, here.reason) == (Status.UNAVAILABLE, ProtectionReason.NO_FIX)
     assert isnan(here.position_m)
     assert isnan(here.speed_mps)
     assert (here.low_m, here.high_m, here.protection_m) == (-inf, inf, inf)
@@ -53,7 +53,7 @@ def test_before_the_first_fix_there_is_no_position(new_trip: Any) -> None:
 def test_with_one_position_sensor_the_claim_says_what_it_does_not_survive(new_trip: Any) -> None:
     trip = new_trip(sensors=frozenset({Sensor.RANGE, Sensor.ODOMETER}))
     here = trip.run(10.0)
-    assert (here.status, here.reason) == (Status.UNMONITORED, Reason.TOO_FEW_SENSORS)
+    assert (here.status, here.reason) == (Status.UNMONITORED, ProtectionReason.TOO_FEW_SENSORS)
     assert here.uncovered == {Sensor.RANGE}
     assert here.protection_m < 3.0
     assert trip.holds(here)
@@ -63,8 +63,8 @@ def test_with_one_position_sensor_the_claim_says_what_it_does_not_survive(new_tr
 def test_with_all_sensors_it_is_protected(new_trip: Any, direction: int) -> None:
     trip = new_trip(replace(DEFAULT, direction=direction)).place()
     here = trip.run(30.0)
-    assert (here.status, here.reason) == (Status.PROTECTED, Reason.NONE)
-    assert not here.found
+    assert (here.status, here.reason) == (Status.PROTECTED, ProtectionReason.NONE)
+    assert not here.detected
     assert here.position_m == pytest.approx(trip.chainage_m, abs=1.5)
     assert here.speed_mps == pytest.approx(trip.velocity_mps, abs=0.5)
     assert here.speed_low_mps < trip.velocity_mps < here.speed_high_mps
@@ -108,7 +108,7 @@ def test_by_wheels_alone_the_interval_grows_with_the_distance_to_too_wide(
     assert steps[-1] == pytest.approx(settings.claim.sigmas * 0.005 * 400.0, rel=0.5)
     trip.speed_mps = 80.0
     trip.run(100.0)
-    assert Reason.TOO_WIDE in {h.reason for h in trip.history}
+    assert ProtectionReason.TOO_WIDE in {h.reason for h in trip.history}
     assert trip.history[-1].status is Status.UNAVAILABLE
 
 
@@ -116,7 +116,7 @@ def test_an_unmonitored_position_is_given_for_a_stated_time(new_trip: Any) -> No
     settings = replace(DEFAULT, claim=IntegrityClaim(unmonitored_s=30.0))
     trip = new_trip(settings, sensors=frozenset({Sensor.RANGE, Sensor.ODOMETER}))
     assert trip.run(29.0).status is Status.UNMONITORED
-    assert trip.run(2.0).reason is Reason.UNMONITORED_TOO_LONG
+    assert trip.run(2.0).reason is ProtectionReason.UNMONITORED_TOO_LONG
     trip.sensors = frozenset(Sensor)
     assert trip.run(30.0).status is Status.PROTECTED
 
@@ -126,7 +126,7 @@ def test_a_train_may_stand_for_an_hour(new_trip: Any) -> None:
     start = trip.run(60.0)
     here = trip.run(3540.0)
     assert here.status is Status.PROTECTED
-    assert not any(h.found for h in trip.history)
+    assert not any(h.detected for h in trip.history)
     assert all(h.low_m <= 1000.0 <= h.high_m for h in trip.history)
     # Thousands of ranges with the same bias are worth one, and wheels that stand hardly drift.
     assert here.sigma_m == pytest.approx(DEFAULT.ranging.bias_m, rel=0.25)
@@ -144,7 +144,7 @@ def test_a_late_range_is_brought_to_now(new_trip: Any) -> None:
 
     here = trip.run(20.0, late)
     assert here.position_m == pytest.approx(trip.chainage_m, abs=1.0)
-    assert not any(h.found for h in trip.history)
+    assert not any(h.detected for h in trip.history)
 
 
 def test_slipping_wheels_are_believed_less_and_no_fault(new_trip: Any) -> None:
@@ -157,10 +157,10 @@ def test_slipping_wheels_are_believed_less_and_no_fault(new_trip: Any) -> None:
         readings["odometer"] = wheels._replace(speed_mps=wheels.speed_mps + float(next(spin)))
 
     trip.run(4.1, slip)
-    assert not any(h.found for h in trip.history)
+    assert not any(h.detected for h in trip.history)
     here = trip.run(20.0)
     assert trip.holds(here)
-    assert not here.found
+    assert not here.detected
     assert here.speed_mps == pytest.approx(25.0, abs=0.5)
 
 
@@ -176,9 +176,9 @@ FAULTS = {
 def test_a_sudden_fault_is_found_and_its_sensor_excluded(new_trip: Any, name: str) -> None:
     sensor, falsify, within_s = FAULTS[name]
     trip = new_trip().place()
-    assert not trip.run(20.0).found
+    assert not trip.run(20.0).detected
     here = trip.run(within_s, falsify)
-    assert here.found
+    assert here.detected
     assert here.excluded == {sensor}
     here = trip.run(10.0, falsify)
     assert here.status is Status.PROTECTED
@@ -194,7 +194,7 @@ def test_a_frozen_range_is_found_when_the_train_moves(new_trip: Any) -> None:
             chainage_m=1000.0 + 0.2 * float(trip.rng.standard_normal())
         )
 
-    assert not trip.run(20.0, freeze).found
+    assert not trip.run(20.0, freeze).detected
     for speed_mps in np.linspace(0.0, 10.0, 100):
         trip.speed_mps = float(speed_mps)
         assert trip.holds(trip.run(TICK_S, freeze))
@@ -213,7 +213,7 @@ def test_a_range_that_creeps_away_is_found_by_comparison(new_trip: Any) -> None:
     while not trip.history[-1].excluded:
         here = trip.run(TICK_S, falsify)
         assert here.status is Status.UNAVAILABLE or trip.holds(here)
-        if here.found and isnan(found_m):
+        if here.detected and isnan(found_m):
             found_m = 0.05 * (trip.tick - 200)
     assert trip.history[-1].excluded == {Sensor.RANGE}
     # Found before the error became as large as the protection level had been.
@@ -232,7 +232,7 @@ def test_a_worn_wheel_is_estimated_and_a_wrong_one_is_found(new_trip: Any) -> No
         )
 
     goal = 1.02
-    assert not trip.run(20.0, scaled).found
+    assert not trip.run(20.0, scaled).detected
     goal = 1.25
     here = trip.run(60.0, scaled)
     assert here.excluded == {Sensor.ODOMETER}
@@ -245,7 +245,7 @@ def test_with_two_sensors_a_fault_is_found_but_not_whose(new_trip: Any) -> None:
     trip.run(20.0)
     off = iter(np.arange(0.0, 2000.0, 0.2))
     here = trip.run(10.0, shifted("range", lambda: float(next(off))))
-    assert here.found
+    assert here.detected
     assert not here.excluded
     # Either may be wrong, and the interval holds what each of them says.
     assert here.protection_m > 5.0
@@ -269,7 +269,7 @@ def test_two_faulty_sensors_make_it_unavailable_and_it_begins_anew(new_trip: Any
 
     trip.run(30.0, both)
     reasons = [h.reason for h in trip.history[200:]]
-    assert Reason.CONTRADICTION in reasons
+    assert ProtectionReason.CONTRADICTION in reasons
     assert trip.history[-1].status is not Status.PROTECTED
     here = trip.run(60.0)
     assert here.status is not Status.UNAVAILABLE
@@ -294,9 +294,9 @@ def test_a_single_outlier_is_left_out_and_no_more(new_trip: Any) -> None:
     trip.run(30.0)
     before = trip.history[-1]
     here = trip.run(0.2, shifted("range", 400.0))
-    assert not here.found
+    assert not here.detected
     here = trip.run(1.0)
-    assert not here.found
+    assert not here.detected
     assert here.position_m == pytest.approx(trip.chainage_m, abs=1.5)
     assert here.protection_m == pytest.approx(before.protection_m, abs=5.0)
 

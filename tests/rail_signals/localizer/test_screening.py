@@ -14,7 +14,7 @@ from rail_signals.localizer.readings import (
     BlockEntry,
     DopplerFix,
     RangeFix,
-    TickReadings,
+    TickMeasurements,
     WheelSpeed,
 )
 from rail_signals.localizer.screening import MOST_M, MOST_MPS, SAME_TIME_S, ReadingScreen, Rejection
@@ -69,12 +69,12 @@ LIMITS = [
 def screened(name: str, reading: Any, screen: ReadingScreen | None = None) -> Any:
     """Return what a screen leaves of one reading."""
     screen = ReadingScreen(OLDEST_S, MOST_ALIKE) if screen is None else screen
-    return getattr(screen.screen(NOW_S, TickReadings(**{name: reading})), name)
+    return getattr(screen.screen(NOW_S, TickMeasurements(**{name: reading})), name)
 
 
 def located(localizer: Localizer, time_s: float, **readings: Any) -> Localization:
     """Return what a localizer says of a tick."""
-    return Localization.of(localizer.tick(time_s, TickReadings(**readings)))
+    return Localization.of(localizer.tick(time_s, TickMeasurements(**readings)))
 
 
 def running() -> Localizer:
@@ -131,7 +131,7 @@ def test_time_stamps_only_go_forwards(name: str) -> None:
     for tick, stamp_s in enumerate([0.0, 0.2, 0.1, 0.2, 0.2 + 3e-6, 0.2 + 3e-6]):
         time_s = 0.5 + 0.5 * tick
         reading = GOOD[name]._replace(age_s=time_s - stamp_s)
-        used.append(getattr(screen.screen(time_s, TickReadings(**{name: reading})), name))
+        used.append(getattr(screen.screen(time_s, TickMeasurements(**{name: reading})), name))
     assert [reading is not None for reading in used] == [True, True, False, False, True, False]
     sensor = SENSOR_OF[name]
     assert screen.counts == {(sensor, Rejection.BACKWARDS): 1, (sensor, Rejection.REPEATED): 2}
@@ -141,7 +141,7 @@ def run_of(name: str, readings: list[Any]) -> tuple[list[bool], ReadingScreen]:
     """Return which of the readings of consecutive ticks are evidence."""
     screen = ReadingScreen(OLDEST_S, MOST_ALIKE)
     return [
-        getattr(screen.screen(0.1 * tick, TickReadings(**{name: reading})), name) is not None
+        getattr(screen.screen(0.1 * tick, TickMeasurements(**{name: reading})), name) is not None
         for tick, reading in enumerate(readings)
     ], screen
 
@@ -210,14 +210,14 @@ def test_many_runs_are_screened_as_one_by_one() -> None:
         readings = {
             name: type(GOOD[name])(**values, present=present) for name, values in fields.items()
         }
-        left = together.screen(time_s, TickReadings(**readings))
+        left = together.screen(time_s, TickMeasurements(**readings))
         for run, screen in enumerate(alone):
             single = {
                 name: type(GOOD[name])(**{key: float(v[run, 0]) for key, v in values.items()})
                 for name, values in fields.items()
             }
             one = screen.screen(
-                time_s, TickReadings(**single) if present[run, 0] else TickReadings()
+                time_s, TickMeasurements(**single) if present[run, 0] else TickMeasurements()
             )
             for name in GOOD:
                 kept = getattr(left, name)

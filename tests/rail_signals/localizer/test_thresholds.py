@@ -16,12 +16,17 @@ from rail_signals.localizer.filter_bank import (
     RANGE_BIAS,
     SCALE,
     FilterBank,
-    Outcome,
     S,
+    UpdateResult,
     V,
 )
 from rail_signals.localizer.integrity_monitor import HYPOTHESES, IntegrityMonitor
-from rail_signals.localizer.protection_level import Estimate, ProtectionLevels, Reason, Status
+from rail_signals.localizer.protection_level import (
+    Estimate,
+    ProtectionLevels,
+    ProtectionReason,
+    Status,
+)
 from rail_signals.localizer.settings import IntegrityClaim, LocalizerSettings, Sensor
 
 SETTINGS = LocalizerSettings()
@@ -100,7 +105,7 @@ def test_separations_of_position_and_of_speed(
     gained = np.sqrt(sigma**2 - bank.variances[state, 0])
     bank.variances[state, without_range] = sigma**2
     bank.x[state, without_range] = factor * SIGMAS_OF_A_TEST * gained
-    assert bool(estimate_of(bank).found) is found
+    assert bool(estimate_of(bank).detected) is found
 
 
 @SIDES
@@ -110,7 +115,7 @@ def test_filters_that_know_the_same_may_differ_by_this(
 ) -> None:
     bank = bank_of(1.0)
     bank.x[state, 1 + Sensor.DOPPLER] = factor * SIGMAS_OF_A_TEST * least
-    assert bool(estimate_of(bank).found) is found
+    assert bool(estimate_of(bank).detected) is found
 
 
 @SIDES
@@ -127,7 +132,7 @@ def test_estimates_of_scale_and_biases(
 ) -> None:
     bank = bank_of(1.0)
     bank.x[state] = -factor * SIGMAS_OF_A_TEST * sigma
-    assert bool(estimate_of(bank).found) is found
+    assert bool(estimate_of(bank).detected) is found
 
 
 @pytest.mark.parametrize(
@@ -138,7 +143,7 @@ def test_the_widest_level_that_is_given(factor: float, status: Status) -> None:
     here = estimate_of(bank)
     assert here.status == status
     if status is Status.UNAVAILABLE:
-        assert here.reason == Reason.TOO_WIDE
+        assert here.reason == ProtectionReason.TOO_WIDE
 
 
 @pytest.mark.parametrize(
@@ -152,7 +157,7 @@ def test_the_widest_hull_of_intervals_that_are_each_narrow_enough(
     bank.variances[S, 1 + Sensor.RANGE] = sigma_m**2
     bank.x[S, 1 + Sensor.RANGE] = factor * CLAIM.widest_m - sigma_m * SIGMAS_OF_THE_LEVEL
     here = estimate_of(bank)
-    assert not here.found
+    assert not here.detected
     assert here.status == status
 
 
@@ -189,10 +194,10 @@ def separated() -> FilterBank:
 @pytest.mark.parametrize(("seconds", "found"), [(CLAIM.hold_s - 0.1, True), (CLAIM.hold_s, False)])
 def test_how_long_a_refuted_hypothesis_stays_so(seconds: float, found: bool) -> None:
     monitor = IntegrityMonitor(CLAIM)
-    assert estimate_of(separated(), monitor).found
+    assert estimate_of(separated(), monitor).detected
     monitor.test(bank_of(), seconds)
     here = ProtectionLevels(CLAIM).estimate(bank_of(), monitor, seconds)
-    assert bool(here.found) is found
+    assert bool(here.detected) is found
 
 
 @pytest.mark.parametrize("sensor", Sensor)
@@ -204,8 +209,8 @@ def test_so_many_readings_in_a_row_outside_of_the_gate(sensor: Sensor) -> None:
     def note(*, refused: bool) -> bool:
         zeros = np.zeros(len(FILTERS))
         refusals = monitor.use(sensor, True).copy() if refused else None
-        monitor.note(sensor, bank, True, (Outcome(refusals, zeros, zeros + 1.0),))
-        return bool(estimate_of(bank, monitor).found)
+        monitor.note(sensor, bank, True, (UpdateResult(refusals, zeros, zeros + 1.0),))
+        return bool(estimate_of(bank, monitor).detected)
 
     # One less than that, and one that passes, any number of times.
     for _ in range(3):
@@ -231,7 +236,7 @@ def returns_after(
     for reading in range(readings):
         off = 100.0 if reading == breach_at else sigmas
         innovation = np.full(len(FILTERS), off * 3.0)
-        outcome = Outcome(None, innovation, np.full(len(FILTERS), 9.0))
+        outcome = UpdateResult(None, innovation, np.full(len(FILTERS), 9.0))
         monitor.note(sensor, bank, True, (outcome,))
         monitor.test(bank, seconds / (readings - 1))
     return not monitor.excluded[sensor]
@@ -258,9 +263,9 @@ def test_how_long_an_unmonitored_position_is_given() -> None:
     levels, monitor, bank = ProtectionLevels(CLAIM), IntegrityMonitor(CLAIM), bank_of()
     bank.known[1 + Sensor.RANGE] = False
     here = levels.estimate(bank, monitor, CLAIM.unmonitored_s)
-    assert (here.status, here.reason) == (Status.UNMONITORED, Reason.TOO_FEW_SENSORS)
+    assert (here.status, here.reason) == (Status.UNMONITORED, ProtectionReason.TOO_FEW_SENSORS)
     here = levels.estimate(bank, monitor, 0.1)
-    assert (here.status, here.reason) == (Status.UNAVAILABLE, Reason.UNMONITORED_TOO_LONG)
+    assert (here.status, here.reason) == (Status.UNAVAILABLE, ProtectionReason.UNMONITORED_TOO_LONG)
     # Monitored again, the time begins anew.
     levels.estimate(bank_of(), monitor, 0.1)
     assert levels.estimate(bank, monitor, CLAIM.unmonitored_s).status == Status.UNMONITORED
@@ -271,7 +276,10 @@ def test_how_long_a_contradiction_lasts_before_it_begins_anew() -> None:
     monitor.excluded[[Sensor.RANGE, Sensor.DOPPLER]] = True
     monitor._any_excluded = True
     monitor.test(bank, CLAIM.restart_s - 0.1)
-    assert ProtectionLevels(CLAIM).estimate(bank, monitor, 0.1).reason == Reason.CONTRADICTION
+    assert (
+        ProtectionLevels(CLAIM).estimate(bank, monitor, 0.1).reason
+        == ProtectionReason.CONTRADICTION
+    )
     assert monitor.excluded.sum() == 2
     monitor.test(bank, 0.1)
     assert not monitor.excluded.any()

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rail_signals.ranging.receiver import MAX_SNR, LineReceiver, ToneEstimate
+from rail_signals.ranging.receiver import MAX_SNR, FmToneReceiver, ToneEstimate
 from rail_signals.ranging.signal import RangingSignal, modulate
 
 ONE = RangingSignal()
 TWO = RangingSignal(tones_hz=(375e3, 37.5e3), deviations_hz=(375e3, 37.5e3))
-RECEIVERS = {1: LineReceiver(ONE), 2: LineReceiver(TWO)}
+RECEIVERS = {1: FmToneReceiver(ONE), 2: FmToneReceiver(TWO)}
 
 
 def noise(rng: np.random.Generator, shape: tuple[int, ...], db: float = 0.0) -> np.ndarray:
@@ -55,8 +55,8 @@ def test_false_alarms_are_as_rare_as_asked(max_offset_hz: float) -> None:
     rng = np.random.default_rng(30)
     trials, rate = 20_000, 1e-2
     signal = RangingSignal(samples=320)
-    receiver = LineReceiver(signal, max_offset_hz=max_offset_hz, false_alarm=rate)
-    strict = LineReceiver(signal, max_offset_hz=max_offset_hz)
+    receiver = FmToneReceiver(signal, max_offset_hz=max_offset_hz, false_alarm=rate)
+    strict = FmToneReceiver(signal, max_offset_hz=max_offset_hz)
     bursts = noise(rng, (trials, 320), db=17.0)
     alarms = receiver.estimate(bursts).detected.mean()
     spread = math.sqrt(rate / trials)
@@ -128,7 +128,7 @@ def test_result_does_not_depend_on_the_batch(
     signal: RangingSignal, max_offset_hz: float, precision: type
 ) -> None:
     rng = np.random.default_rng(33)
-    receiver = LineReceiver(signal, max_offset_hz=max_offset_hz)
+    receiver = FmToneReceiver(signal, max_offset_hz=max_offset_hz)
     bursts = modulate(signal, rng.uniform(0, 6, (50, len(signal.tones_hz))))
     bursts = (bursts + noise(rng, bursts.shape, db=-3.0)).astype(precision)
     whole = receiver.estimate(bursts)
@@ -146,7 +146,7 @@ def test_result_does_not_depend_on_the_batch(
 def test_single_precision_is_good_to_60_db() -> None:
     rng = np.random.default_rng(36)
     signal = RangingSignal(samples=3968)
-    receiver = LineReceiver(signal)
+    receiver = FmToneReceiver(signal)
     lag = rng.uniform(0, 2 * math.pi, (1000, 1))
     bursts = modulate(signal, lag)
     bursts *= np.exp(2j * math.pi * 4321.0 / 4e6 * np.arange(signal.samples))
@@ -166,21 +166,21 @@ def test_two_signals_show_in_the_misfit() -> None:
     alone = RECEIVERS[1].estimate(one + disturbance)
     both = RECEIVERS[1].estimate(one + 0.7 * turn * other + disturbance)
     jammed = RECEIVERS[1].estimate(one + 2.0 + disturbance)
-    assert alone.misfit.mean() == pytest.approx(1.0, abs=0.1)
+    assert alone.reduced_chi_square.mean() == pytest.approx(1.0, abs=0.1)
     # 9 real degrees of freedom: less than one clean burst in 10 000 passes 4.
-    assert alone.misfit.max() < 4
-    assert np.mean(both.misfit > 4) > 0.9
-    assert (jammed.misfit > 4).all()
+    assert alone.reduced_chi_square.max() < 4
+    assert np.mean(both.reduced_chi_square > 4) > 0.9
+    assert (jammed.reduced_chi_square > 4).all()
 
 
 def test_wrong_parameters() -> None:
     with pytest.raises(ValueError, match="max_offset_hz must be finite"):
-        LineReceiver(ONE, max_offset_hz=-1.0)
+        FmToneReceiver(ONE, max_offset_hz=-1.0)
     with pytest.raises(ValueError, match="max_offset_hz must stay below 5625 Hz"):
-        LineReceiver(TWO, max_offset_hz=6e3)
+        FmToneReceiver(TWO, max_offset_hz=6e3)
     with pytest.raises(ValueError, match="false_alarm must lie between"):
-        LineReceiver(ONE, false_alarm=0.0)
+        FmToneReceiver(ONE, false_alarm=0.0)
     with pytest.raises(ValueError, match="samples must hold two periods"):
-        LineReceiver(RangingSignal(samples=32))
+        FmToneReceiver(RangingSignal(samples=32))
     with pytest.raises(ValueError, match="bursts must have 960 samples"):
         RECEIVERS[1].estimate(np.zeros((2, 959)))

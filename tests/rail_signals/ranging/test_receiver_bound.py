@@ -11,7 +11,7 @@ from rail_signals.ranging.bounds import (
     complex_tone_frequency_variance_bound,
     tone_phase_variance_bound,
 )
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import RangingSignal, discriminate, modulate, tone_of
 
 SIGNAL = RangingSignal(samples=3968)
@@ -31,7 +31,7 @@ def rms_turn(error: np.ndarray) -> float:
 
 def test_error_is_the_bound_from_minus_10_to_40_db() -> None:
     rng = np.random.default_rng(20)
-    receiver = LineReceiver(SIGNAL)
+    receiver = FmToneReceiver(SIGNAL)
     t = np.arange(SIGNAL.samples) / SIGNAL.sample_rate_hz
     errors: dict[tuple[float, float], list[np.ndarray]] = {}
     for _ in range(TRIALS // BATCH):
@@ -50,7 +50,7 @@ def test_error_is_the_bound_from_minus_10_to_40_db() -> None:
                             found.phase_lag_rad[:, 0] - lag[:, 0],
                             found.frequency_offset_hz - offset_hz,
                             found.variance_rad2[:, 0],
-                            found.misfit,
+                            found.reduced_chi_square,
                         ]
                     )
                 )
@@ -82,7 +82,7 @@ def test_discriminator_shows_its_threshold(db: float, low: float, high: float) -
 def test_two_tones_reach_both_bounds() -> None:
     rng = np.random.default_rng(22)
     signal = RangingSignal(tones_hz=(375e3, 37.5e3), deviations_hz=(300e3, 37.5e3))
-    receiver = LineReceiver(signal)
+    receiver = FmToneReceiver(signal)
     lag = rng.uniform(0, 2 * math.pi, (3000, 2))
     wave = modulate(signal, lag)
     wave *= np.exp(2j * math.pi * 2222.0 / 4e6 * np.arange(signal.samples))
@@ -98,7 +98,7 @@ def test_two_tones_reach_both_bounds() -> None:
 def test_sums_of_periods_lose_nothing() -> None:
     """Up to a cycle of offset in a burst, a few weighted sums stand for all its periods."""
     rng = np.random.default_rng(23)
-    receiver = LineReceiver(SIGNAL, max_offset_hz=1e3)
+    receiver = FmToneReceiver(SIGNAL, max_offset_hz=1e3)
     lag = rng.uniform(0, 2 * math.pi, (1000, 1))
     offset_hz = rng.uniform(-1e3, 1e3, 1000)
     offset_hz[:2] = -1e3, 1e3

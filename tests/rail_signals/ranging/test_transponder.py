@@ -11,7 +11,7 @@ from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.delay import fractional_delay
 from rail_signals.ranging.bounds import two_way_range_variance_bound
 from rail_signals.ranging.phase_range import phase_to_range_m, range_to_phase_rad, two_tone_range_m
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import RangingSignal, modulate
 from rail_signals.ranging.transponder import calibrate_delay, transpond
 
@@ -35,7 +35,7 @@ def link(
 @pytest.mark.parametrize(("down_db", "up_db"), [(-6.0, -3.0), (20.0, 10.0)])
 def test_chain_is_within_a_tenth_of_its_bound(down_db: float, up_db: float) -> None:
     rng = np.random.default_rng(40)
-    receiver = LineReceiver(ONE)
+    receiver = FmToneReceiver(ONE)
     range_m = rng.uniform(0, 350, 1500)
     down, up = 10 ** (down_db / 10), 10 ** (up_db / 10)
     sent = np.broadcast_to(modulate(ONE, [0.0]), (1500, 960))
@@ -54,7 +54,7 @@ def test_chain_is_within_a_tenth_of_its_bound(down_db: float, up_db: float) -> N
 
 def test_zones_of_two_kilometres() -> None:
     rng = np.random.default_rng(41)
-    receiver = LineReceiver(TWO)
+    receiver = FmToneReceiver(TWO)
     range_m = rng.uniform(0, 2000, 400)
     sent = np.broadcast_to(modulate(TWO, [0.0, 0.0]), (400, 960))
     heard = receiver.estimate(link(rng, sent, range_m, 3.0))
@@ -72,11 +72,11 @@ def test_zones_of_two_kilometres() -> None:
 def test_silence_is_answered_by_silence() -> None:
     bursts = np.zeros((2, 960), dtype=complex)
     bursts[1] = modulate(ONE, [1.0])
-    reply = transpond(LineReceiver(ONE).estimate(bursts), ONE, DELAY_S)
+    reply = transpond(FmToneReceiver(ONE).estimate(bursts), ONE, DELAY_S)
     assert not reply[0].any()
     lag = 1.0 + 2 * math.pi * 375e3 * DELAY_S
     np.testing.assert_allclose(reply[1], modulate(ONE, [lag]), atol=1e-4)
-    alone = transpond(LineReceiver(ONE).estimate(bursts[0]), ONE, DELAY_S)
+    alone = transpond(FmToneReceiver(ONE).estimate(bursts[0]), ONE, DELAY_S)
     assert alone.shape == (960,)
     assert not alone.any()
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rail_signals.track_code.block_demodulator import FastDemodulator
+from rail_signals.track_code.block_demodulator import BlockDemodulator
 from rail_signals.track_code.decision import Decision
 from rail_signals.track_code.demodulator import Demodulator, DemodulatorChain
 from rail_signals.track_code.profile import TrackCodeProfile, load_profile
-from rail_signals.track_code.receiver import FastTrackCodeReceiver
-from rail_signals.track_code.reference_receiver import TrackCodeReceiver
+from rail_signals.track_code.receiver import TrackCodeReceiver
+from rail_signals.track_code.reference_receiver import ReferenceTrackCodeReceiver
 from rail_signals.track_code.signal import FmTransmitter
 from rail_signals.track_code.word import encode
 
@@ -69,8 +69,8 @@ def test_every_decision_is_that_of_the_chain(name: str, rate_hz: float, carrier_
     rng = np.random.default_rng(1)
     profile = load_profile(name)
     wave = wave_of(rng, profile, rate_hz, carrier_hz=carrier_hz)
-    fast = FastTrackCodeReceiver(profile, carrier_hz, rate_hz).feed(wave)
-    slow = TrackCodeReceiver(profile, carrier_hz, rate_hz).feed(wave)
+    fast = TrackCodeReceiver(profile, carrier_hz, rate_hz).feed(wave)
+    slow = ReferenceTrackCodeReceiver(profile, carrier_hz, rate_hz).feed(wave)
     assert_same(fast, slow)
     assert sum(d.valid for d in fast) > len(fast) / 4
 
@@ -78,8 +78,8 @@ def test_every_decision_is_that_of_the_chain(name: str, rate_hz: float, carrier_
 def test_decisions_do_not_depend_on_the_blocks() -> None:
     rng = np.random.default_rng(2)
     wave = wave_of(rng, TONES27, 16_000.0).astype(np.float32)
-    whole = FastTrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(wave)
-    receiver = FastTrackCodeReceiver(TONES27, 1700.0, 16_000.0)
+    whole = TrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(wave)
+    receiver = TrackCodeReceiver(TONES27, 1700.0, 16_000.0)
     cuts = np.sort(rng.integers(0, wave.size, 60))
     pieces = [d for block in np.split(wave, cuts) for d in receiver.feed(block)]
     assert receiver.feed(np.zeros(0)) == []
@@ -89,8 +89,10 @@ def test_decisions_do_not_depend_on_the_blocks() -> None:
 def test_hops_of_other_lengths() -> None:
     wave = wave_of(np.random.default_rng(3), TONES27, 16_000.0)
     for hop in (5, 32):
-        fast = FastTrackCodeReceiver(TONES27, 1700.0, 16_000.0, hop_samples=hop, confirmations=1)
-        slow = TrackCodeReceiver(TONES27, 1700.0, 16_000.0, hop_samples=hop, confirmations=1)
+        fast = TrackCodeReceiver(TONES27, 1700.0, 16_000.0, hop_samples=hop, confirmations=1)
+        slow = ReferenceTrackCodeReceiver(
+            TONES27, 1700.0, 16_000.0, hop_samples=hop, confirmations=1
+        )
         assert_same(fast.feed(wave), slow.feed(wave))
 
 
@@ -101,8 +103,8 @@ def test_faults_of_the_input_are_told_as_by_the_chain() -> None:
     wave[140_000:160_000] = 0.0
     wave[200_000] = -1e9
     wave[240_000:250_000] *= 1e-5
-    fast = FastTrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(wave)
-    slow = TrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(wave)
+    fast = TrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(wave)
+    slow = ReferenceTrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(wave)
     reasons = {d.reason for d in fast}
     assert {
         "samples are not finite",
@@ -116,7 +118,7 @@ def test_faults_of_the_input_are_told_as_by_the_chain() -> None:
 
 def test_reset_starts_anew() -> None:
     wave = wave_of(np.random.default_rng(5), TONES27, 16_000.0)
-    receiver = FastTrackCodeReceiver(TONES27, 1700.0, 16_000.0)
+    receiver = TrackCodeReceiver(TONES27, 1700.0, 16_000.0)
     first = receiver.feed(wave[:70_123])
     receiver.reset()
     assert_same(receiver.feed(wave[:70_123]), first, level=1e-9)
@@ -124,7 +126,7 @@ def test_reset_starts_anew() -> None:
 
 def test_arrays_of_decisions_are_read_only() -> None:
     wave = wave_of(np.random.default_rng(6), TONES27, 16_000.0, count=1)
-    for decision in FastTrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(wave):
+    for decision in TrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(wave):
         assert not decision.bits.flags.writeable
         assert not decision.levels.flags.writeable
 
@@ -135,7 +137,7 @@ def test_the_demodulated_wave_is_that_of_the_chain(rate_hz: float) -> None:
     chain = DemodulatorChain(TONES27, 1700.0, rate_hz)
     hops = round(rate_hz / 8)
     wave = wave_of(rng, TONES27, rate_hz, seconds=3.0, noise=0.05).reshape(-1, hops)
-    fast = FastDemodulator(chain, 8)
+    fast = BlockDemodulator(chain, 8)
     found, amplitude = fast.demodulate(fast.decimate(wave.astype(np.float32)), len(wave))
     slow = Demodulator(chain)
     frames = [slow.frame(frame) for frame in wave]
@@ -149,4 +151,4 @@ def test_the_demodulated_wave_is_that_of_the_chain(rate_hz: float) -> None:
 @pytest.mark.parametrize("samples", [np.zeros((2, 3)), np.zeros(3, dtype=int), np.zeros(3, "c16")])
 def test_what_is_no_wave_is_refused(samples: np.ndarray) -> None:
     with pytest.raises(ValueError, match="real floats in one dimension"):
-        FastTrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(samples)
+        TrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(samples)

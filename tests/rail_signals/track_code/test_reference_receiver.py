@@ -14,7 +14,10 @@ import pytest
 from rail_signals.track_code.decision import Decision
 from rail_signals.track_code.demodulator import Demodulator, DemodulatorChain
 from rail_signals.track_code.profile import TrackCodeProfile, load_profile
-from rail_signals.track_code.reference_receiver import TrackCodeReceiver, receiver_estimator
+from rail_signals.track_code.reference_receiver import (
+    ReferenceTrackCodeReceiver,
+    receiver_estimator,
+)
 from rail_signals.track_code.signal import FmTransmitter
 from rail_signals.track_code.tone_levels import tone_columns
 from rail_signals.track_code.word import encode
@@ -40,7 +43,7 @@ def words(
     """Start [s], fields and decisions of words that follow each other in one wave."""
     rng = np.random.default_rng(round(carrier_hz + snr_db))
     transmitter = FmTransmitter(profile, carrier_hz + offset_hz, RATE_HZ)
-    receiver = TrackCodeReceiver(profile, carrier_hz, RATE_HZ)
+    receiver = ReferenceTrackCodeReceiver(profile, carrier_hz, RATE_HZ)
     for _ in range(count):
         start_s = transmitter.samples / RATE_HZ
         fields = random_fields(profile, rng)
@@ -95,7 +98,7 @@ def test_the_other_families(name: str) -> None:
         fields[profile.fields[0][0]] = fields[profile.fields[0][0]] or 1
         bits = encode(profile, fields)
         wave = FmTransmitter(profile, 1700.0, RATE_HZ).block(bits, 25_600)
-        decisions = TrackCodeReceiver(profile, 1700.0, RATE_HZ).feed(
+        decisions = ReferenceTrackCodeReceiver(profile, 1700.0, RATE_HZ).feed(
             wave + noise(rng, wave.size, 20.0)
         )
         assert decisions[-1].fields == fields
@@ -107,7 +110,7 @@ def test_the_other_families(name: str) -> None:
 def test_levels_at_other_rates(rate_hz: float, bits: np.ndarray) -> None:
     # The first word keeps the bands fullest, the second sends the tone nearest to the rejecter.
     wave = FmTransmitter(TONES27, 2600.0, rate_hz).block(bits, round(3 * rate_hz))
-    levels = TrackCodeReceiver(TONES27, 2600.0, rate_hz).feed(wave)[-1].levels
+    levels = ReferenceTrackCodeReceiver(TONES27, 2600.0, rate_hz).feed(wave)[-1].levels
     np.testing.assert_allclose(levels, bits, atol=0.04)
 
 
@@ -141,8 +144,8 @@ def test_blocks_do_not_show(size: int, hop: int) -> None:
     transmitter = FmTransmitter(profile, 2000.0, RATE_HZ)
     wave = np.concatenate([transmitter.block(np.arange(18) == k, 16_000) for k in (3, 9)])
     wave += noise(rng, wave.size, 15.0)
-    whole = TrackCodeReceiver(profile, 2000.0, RATE_HZ, hop_samples=hop).feed(wave)
-    receiver = TrackCodeReceiver(profile, 2000.0, RATE_HZ, hop_samples=hop)
+    whole = ReferenceTrackCodeReceiver(profile, 2000.0, RATE_HZ, hop_samples=hop).feed(wave)
+    receiver = ReferenceTrackCodeReceiver(profile, 2000.0, RATE_HZ, hop_samples=hop)
     cut = [d for at in range(0, wave.size, size) for d in receiver.feed(wave[at : at + size])]
     assert len(cut) == len(whole) == 320 // hop
     assert {d.fields["tone"] for d in whole if d.fields} == {3, 9}
@@ -161,7 +164,8 @@ def test_confirmation_costs_one_hop_each() -> None:
     first = [
         next(d.time_s for d in receiver.feed(wave) if d.valid)
         for receiver in (
-            TrackCodeReceiver(TONES27, 1700.0, RATE_HZ, confirmations=count) for count in (1, 2, 5)
+            ReferenceTrackCodeReceiver(TONES27, 1700.0, RATE_HZ, confirmations=count)
+            for count in (1, 2, 5)
         )
     ]
     np.testing.assert_allclose(np.diff(first), [0.125, 0.375])

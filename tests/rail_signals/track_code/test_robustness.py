@@ -10,7 +10,7 @@ import pytest
 from rail_signals.track_code.decision import Confirmation, judge_levels
 from rail_signals.track_code.demodulator import DemodulatorChain
 from rail_signals.track_code.profile import load_profile
-from rail_signals.track_code.reference_receiver import TrackCodeReceiver
+from rail_signals.track_code.reference_receiver import ReferenceTrackCodeReceiver
 from rail_signals.track_code.signal import FmTransmitter
 from rail_signals.track_code.word import encode
 
@@ -21,8 +21,8 @@ SECONDS = 6
 TIME_S = np.arange(SECONDS * 6400) / RATE_HZ
 
 
-def receiver(carrier_hz: float = 1700.0) -> TrackCodeReceiver:
-    return TrackCodeReceiver(TONES27, carrier_hz, RATE_HZ)
+def receiver(carrier_hz: float = 1700.0) -> ReferenceTrackCodeReceiver:
+    return ReferenceTrackCodeReceiver(TONES27, carrier_hz, RATE_HZ)
 
 
 def wave(carrier_hz: float = 1700.0, fields: dict[str, int] = FIELDS) -> np.ndarray:
@@ -67,7 +67,7 @@ def test_what_is_no_message(samples: np.ndarray, reason: str) -> None:
 @pytest.mark.parametrize("name", ["tones27", "tones18", "three_tones"])
 def test_noise_alone_is_no_message(name: str) -> None:
     rng = np.random.default_rng(6)
-    listener = TrackCodeReceiver(load_profile(name), 2300.0, RATE_HZ)
+    listener = ReferenceTrackCodeReceiver(load_profile(name), 2300.0, RATE_HZ)
     for _ in range(12):
         decisions = listener.feed(rng.normal(size=10 * 6400))
         assert not any(d.valid for d in decisions)
@@ -158,15 +158,15 @@ def test_wrong_samples(samples: object) -> None:
 
 def test_wrong_parameters() -> None:
     with pytest.raises(ValueError, match=r"multiple of 128 Hz, got 8000\.0"):
-        TrackCodeReceiver(TONES27, 1700.0, 8000.0)
+        ReferenceTrackCodeReceiver(TONES27, 1700.0, 8000.0)
     with pytest.raises(ValueError, match="sample_rate_hz must be 5650 Hz or more"):
-        TrackCodeReceiver(TONES27, 2600.0, 5632.0)
+        ReferenceTrackCodeReceiver(TONES27, 2600.0, 5632.0)
     with pytest.raises(ValueError, match="carrier_hz must be finite and above 440"):
         DemodulatorChain(TONES27, math.nan, RATE_HZ)
     with pytest.raises(ValueError, match="hop_samples must be a positive integer, got 0"):
-        TrackCodeReceiver(TONES27, 1700.0, RATE_HZ, hop_samples=0)
+        ReferenceTrackCodeReceiver(TONES27, 1700.0, RATE_HZ, hop_samples=0)
     with pytest.raises(ValueError, match="confirmations must be a positive integer, got 0"):
-        TrackCodeReceiver(TONES27, 1700.0, RATE_HZ, confirmations=0)
+        ReferenceTrackCodeReceiver(TONES27, 1700.0, RATE_HZ, confirmations=0)
     with pytest.raises(ValueError, match="least_amplitude must be finite and above zero, got -1"):
-        TrackCodeReceiver(TONES27, 1700.0, RATE_HZ, least_amplitude=-1)
+        ReferenceTrackCodeReceiver(TONES27, 1700.0, RATE_HZ, least_amplitude=-1)
     assert Confirmation(1).confirm(np.array([True]))

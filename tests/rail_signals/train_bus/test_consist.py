@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rail_signals.train_bus.bus_line import BusLine, CableSection, Coupler, Stub, Termination
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.consist import COMMON, CUT, CarRun, Consist, Deviations, Tolerances
 from rail_signals.train_bus.faults import LooseConnector, MissingShieldGround
-from rail_signals.train_bus.line import Coupler, Line, Section, Stub, Termination
 from rail_signals.train_bus.roughness import draw_roughness, roughened
 from rail_signals.train_bus.tdr.backscatter import (
     Metric,
@@ -27,11 +27,11 @@ from rail_signals.train_bus.tdr.reflectometer import (
     measure,
     measure_consist,
 )
+from rail_signals.train_bus.tdr.sequential_fit import Windows
 from rail_signals.train_bus.tdr.traces import noise_level, summarise
-from rail_signals.train_bus.tdr.walk import Windows
 
 CABLE = Cable.from_impedance(120.0, 0.7, 0.0534, 0.0, 2.78e-4)
-NODE = Stub(Section(CABLE, 0.4), Termination(10e3), 30e-12)
+NODE = Stub(CableSection(CABLE, 0.4), Termination(10e3), 30e-12)
 TRAIN = Consist(
     (CarRun(CABLE, 26.0), CarRun(CABLE, 47.0)), NODE, Coupler(0.02, 8e-8, 1e-11), Termination(120.0)
 )
@@ -39,10 +39,10 @@ INSTRUMENT = Reflectometer()
 
 
 def test_a_train_as_drawn() -> None:
-    line = TRAIN.line()
-    kinds = [type(e).__name__ for e in line.elements]
-    assert kinds == ["Section", "Stub", "Coupler", "Section", "Stub"]
-    assert line.length_m == TRAIN.length_m == 73.0
+    bus_line = TRAIN.bus_line()
+    kinds = [type(e).__name__ for e in bus_line.elements]
+    assert kinds == ["CableSection", "Stub", "Coupler", "CableSection", "Stub"]
+    assert bus_line.length_m == TRAIN.length_m == 73.0
     assert TRAIN.starts_m.tolist() == [0.0, 26.0, 73.0]
     with pytest.raises(ValueError, match=r"runs must hold one car or more"):
         Consist((), None, Coupler(), Termination())
@@ -65,15 +65,15 @@ def test_one_deviation_at_a_time() -> None:
     plain = Deviations.none(2)
     section = replace(plain, impedance=np.array([0.0, 1.0])).impedance
     assert section.tolist() == [0.0, 1.0]
-    moved = TRAIN.line(replace(plain, delay=np.array([1.0, 0.0]), impedance_batch=-1.0))
+    moved = TRAIN.bus_line(replace(plain, delay=np.array([1.0, 0.0]), impedance_batch=-1.0))
     first, last = moved.elements[0], moved.elements[3]
-    assert isinstance(first, Section) and isinstance(last, Section)
+    assert isinstance(first, CableSection) and isinstance(last, CableSection)
     assert first.delay_factor == pytest.approx(math.exp(0.004))
     assert last.delay_factor == 1.0
     assert first.impedance_factor == last.impedance_factor == pytest.approx(math.exp(-0.02))
-    ended = TRAIN.line(replace(plain, termination=2.0)).termination.resistance_ohm
+    ended = TRAIN.bus_line(replace(plain, termination=2.0)).termination.resistance_ohm
     assert ended == pytest.approx(120.0 * math.exp(0.02))
-    coupler = TRAIN.line(replace(plain, coupler=np.array([1.0]))).elements[2]
+    coupler = TRAIN.bus_line(replace(plain, coupler=np.array([1.0]))).elements[2]
     assert isinstance(coupler, Coupler)
     assert coupler.inductance_h == pytest.approx(8e-8 * 1.15)
 
@@ -85,12 +85,12 @@ def test_roughness_is_the_process_it_says() -> None:
     for lag in (1, 3):
         correlation = float(np.mean(rough[lag:] * rough[:-lag])) / 0.003**2
         assert correlation == pytest.approx(math.exp(-lag / 3.0), abs=0.03)
-    line = roughened(TRAIN.line(), rough)
-    assert line.length_m == pytest.approx(73.0)
-    sections = [e for e in line.elements if isinstance(e, Section)]
+    bus_line = roughened(TRAIN.bus_line(), rough)
+    assert bus_line.length_m == pytest.approx(73.0)
+    sections = [e for e in bus_line.elements if isinstance(e, CableSection)]
     assert len(sections) == 26 + 47
     assert sections[5].impedance_factor == pytest.approx(math.exp(rough[5]))
-    assert roughened(TRAIN.line(), np.zeros(80)) == TRAIN.line()
+    assert roughened(TRAIN.bus_line(), np.zeros(80)) == TRAIN.bus_line()
 
 
 def test_the_covariance_of_stretches() -> None:
@@ -139,16 +139,16 @@ def test_what_an_edge_covers() -> None:
 
 
 def test_a_trace_and_its_noise() -> None:
-    line = Line((Section(CABLE, 47.0),), Termination(120.0))
-    found = measure(line, INSTRUMENT, np.random.default_rng(4), traces=4)
-    assert found.reflection.shape == (4, INSTRUMENT.samples_for(line.delay_s))
+    bus_line = BusLine((CableSection(CABLE, 47.0),), Termination(120.0))
+    found = measure(bus_line, INSTRUMENT, np.random.default_rng(4), traces=4)
+    assert found.reflection.shape == (4, INSTRUMENT.samples_for(bus_line.delay_s))
     assert found.sample_period_s == pytest.approx(5e-9)
     assert noise_level(found.reflection) == pytest.approx(1e-3, rel=0.1)
     assert Reflectometer.with_snr(40.0).noise_rms == pytest.approx(0.01)
     assert Reflectometer.with_snr(63.0).snr_db == pytest.approx(63.0)
     assert float(distance_m(475.1e-9, 0.66 * 299_792_458)) == pytest.approx(47.0, abs=0.01)
     loud = measure(
-        line, INSTRUMENT, np.random.default_rng(4), 4, MissingShieldGround(0, 0.1, 0.1, 3.0)
+        bus_line, INSTRUMENT, np.random.default_rng(4), 4, MissingShieldGround(0, 0.1, 0.1, 3.0)
     )
     assert noise_level(loud.reflection) == pytest.approx(3e-3, rel=0.1)
 

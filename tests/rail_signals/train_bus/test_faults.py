@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from rail_signals.train_bus.bus_line import BusLine, CableSection, Coupler, Termination
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.cascade import input_impedance, input_reflection
 from rail_signals.train_bus.faults import (
@@ -21,20 +22,19 @@ from rail_signals.train_bus.faults import (
     place_of,
     split_at,
 )
-from rail_signals.train_bus.line import Coupler, Line, Section, Termination
 
 CABLE = Cable.from_impedance(120.0, 0.66, 0.05, 0.0, 2.7e-4)
 COUPLER = Coupler(0.02, 80e-9, 10e-12)
-LINE = Line((Section(CABLE, 20.0), COUPLER, Section(CABLE, 30.0)), Termination(120.0))
+LINE = BusLine((CableSection(CABLE, 20.0), COUPLER, CableSection(CABLE, 30.0)), Termination(120.0))
 FREQUENCIES = np.array([1e4, 1e6, 1e7, 5e7])
 
 
 def test_a_split_changes_nothing() -> None:
     elements, index = split_at(LINE, 33.0)
     assert index == 3
-    assert Line(elements, LINE.termination).length_m == pytest.approx(50.0)
+    assert BusLine(elements, LINE.termination).length_m == pytest.approx(50.0)
     np.testing.assert_allclose(
-        input_reflection(Line(elements, LINE.termination), FREQUENCIES, 120.0),
+        input_reflection(BusLine(elements, LINE.termination), FREQUENCIES, 120.0),
         input_reflection(LINE, FREQUENCIES, 120.0),
         rtol=1e-10,
     )
@@ -66,7 +66,7 @@ def test_a_splice_adds_its_resistance() -> None:
 def test_wet_cable_is_slower_and_lower() -> None:
     """Impedance and velocity fall with the root of the capacitance."""
     wet = WaterIngress(25.0, 6.0, 0.44, 2e-6).apply(LINE).elements[3]
-    assert isinstance(wet, Section)
+    assert isinstance(wet, CableSection)
     assert wet.length_m == pytest.approx(6.0)
     assert wet.impedance_ohm == pytest.approx(120.0 / 1.2)
     assert wet.cable.velocity_m_per_s == pytest.approx(CABLE.velocity_m_per_s / 1.2)
@@ -78,7 +78,7 @@ def test_wet_cable_is_slower_and_lower() -> None:
 def test_a_floating_shield_keeps_the_velocity() -> None:
     """All modes of one insulation share one velocity: C falls as L rises."""
     section = MissingShieldGround(1, 0.2, 0.3).apply(LINE).elements[2]
-    assert isinstance(section, Section)
+    assert isinstance(section, CableSection)
     assert section.impedance_ohm == pytest.approx(144.0)
     assert section.cable.velocity_m_per_s == pytest.approx(CABLE.velocity_m_per_s)
     assert section.cable.resistance_ohm_per_m == pytest.approx(0.05 * 1.3)
@@ -87,7 +87,7 @@ def test_a_floating_shield_keeps_the_velocity() -> None:
 def test_wrong_cable_and_loose_connector() -> None:
     other = Cable.from_impedance(75.0, 0.8)
     section = WrongCable(0, other).apply(LINE).elements[0]
-    assert isinstance(section, Section)
+    assert isinstance(section, CableSection)
     assert section.cable == other
     assert section.length_m == 20.0
     loose = LooseConnector(0, 5.0, 1e-8).apply(LINE).elements[1]
@@ -119,7 +119,7 @@ def test_where_faults_are() -> None:
 
 def test_first_step_of_each_kind_has_its_sign() -> None:
     """At low loss: open +1, short -1, series resistance up, water down."""
-    matched = Line((Section(Cable.from_impedance(120.0, 0.66), 50.0),), Termination(120.0))
+    matched = BusLine((CableSection(Cable.from_impedance(120.0, 0.66), 50.0),), Termination(120.0))
     low = [1e3]
     for fault, rho in (
         (OpenCircuit(25.0), 1.0),

@@ -88,7 +88,7 @@ def errors(frame: BusFrameFormat, ebn0: float, frames: int, seed: int) -> tuple[
         wave = np.concatenate((frame.waveform(payload), np.zeros(GUARD)))
         sigma = math.sqrt(wave @ wave / frame.bits / (2.0 * ebn0))
         got = receiver.receive(wave + sigma * rng.standard_normal(len(wave)))
-        assert got.found
+        assert got.detected
         assert got.payload in (None, payload)
         wrong += int(np.count_nonzero(got.bits != bits_of(payload)))
         count += len(got.bits)
@@ -181,7 +181,7 @@ def test_frames_of_another_length_are_no_frames() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "line"),
+    ("wrong", "bus_line"),
     [
         ({"payload_bytes": 0}, "payload_bytes must be from 1 to 1024, got 0"),
         ({"bit_rate_hz": math.nan}, "bit_rate_hz must be above 0, got nan"),
@@ -189,8 +189,8 @@ def test_frames_of_another_length_are_no_frames() -> None:
         ({"rise_time_s": 1e-6}, "rise_time_s must be from 0 to half a bit"),
     ],
 )
-def test_a_wrong_format_is_named(wrong: dict[str, float], line: str) -> None:
-    with pytest.raises(ValueError, match=line):
+def test_a_wrong_format_is_named(wrong: dict[str, float], bus_line: str) -> None:
+    with pytest.raises(ValueError, match=bus_line):
         BusFrameFormat(**wrong)  # type: ignore[arg-type]
 
 

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from rail_signals.train_bus.cable_constants import longest_stub_m
 from rail_signals.train_bus.fault_words import SIZES, fault_words, size_of
 from rail_signals.train_bus.faults import KINDS
-from rail_signals.train_bus.line_constants import longest_stub_m
 from rail_signals.train_bus.tdr.interpretation import Finding
 from rail_signals.train_bus.train import STUB_M, cable_consist, train_consist, train_profiles
 
@@ -32,10 +32,10 @@ def test_the_stub_is_longer_than_the_rule_of_thumb_and_shorter_than_in_service()
 
 
 @pytest.mark.parametrize(
-    ("cars", "line"), [((), "cars must name one profile"), (("CM9",), "got 'CM9'")]
+    ("cars", "bus_line"), [((), "cars must name one profile"), (("CM9",), "got 'CM9'")]
 )
-def test_what_is_no_train(cars: tuple[str, ...], line: str) -> None:
-    with pytest.raises(ValueError, match=line):
+def test_what_is_no_train(cars: tuple[str, ...], bus_line: str) -> None:
+    with pytest.raises(ValueError, match=bus_line):
         train_consist(cars)
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rail_signals.train_bus.line import Termination
+from rail_signals.train_bus.bus_line import Termination
 from rail_signals.train_bus.pulse_check import PulseMask, check_pulse
 from rail_signals.train_bus.transmitter import LOADS, TestLoads, Transmitter, manchester_bits
 
@@ -110,4 +110,4 @@ def test_wrong_values_are_quoted() -> None:
     with pytest.raises(ValueError, match=r"terminator_ohm must be above 0, got nan"):
         TestLoads(terminator_ohm=math.nan)
     with pytest.raises(ValueError, match=r"resistive_share must be below 1, got 1"):
-        TestLoads(resistive_share=1)
+        TestLoads(resistive_fraction=1)

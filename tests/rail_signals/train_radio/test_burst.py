@@ -91,7 +91,7 @@ def test_noise_variance() -> None:
     assert noise_variance(3.0, 4) == pytest.approx(10**-0.3 / 4)
     assert noise_variance(3.0, 2, channel_power=1e-9) == pytest.approx(1e-9 * 10**-0.3 / 2)
     # Shared out over the bits, the energy of pilots makes each bit dearer.
-    assert noise_variance(5.0, 2, pilot_share=0.2) == pytest.approx(noise_variance(5.0, 2) / 0.8)
+    assert noise_variance(5.0, 2, pilot_fraction=0.2) == pytest.approx(noise_variance(5.0, 2) / 0.8)
 
 
 def test_noise_per_sample_is_noise_per_symbol() -> None:
@@ -271,7 +271,7 @@ def test_symbols_stand_where_the_format_says() -> None:
         (lambda: noise_variance(math.nan, 1), "nan"),
         (lambda: noise_variance(0.0, 0), "0"),
         (lambda: noise_variance(0.0, 1, channel_power=-1.0), "-1.0"),
-        (lambda: noise_variance(0.0, 1, pilot_share=1.0), "1.0"),
+        (lambda: noise_variance(0.0, 1, pilot_fraction=1.0), "1.0"),
         (lambda: root_raised_cosine(0.0, 4, 6), "0.0"),
         (lambda: root_raised_cosine(0.3, 1, 6), "1"),
         (lambda: root_raised_cosine(0.3, 4, 0), "0"),

@@ -57,7 +57,7 @@ def test_positions(pairs: int, transmit: int, block: int, free: int) -> None:
     assert pilots[-1] == pattern.symbols - 1
     assert np.diff(pilots).max() <= free + 1
     assert (np.diff(pilots[::block]) <= block + free).all()
-    assert pattern.pilot_share == pytest.approx(len(pilots) / pattern.symbols)
+    assert pattern.pilot_fraction == pytest.approx(len(pilots) / pattern.symbols)
 
 
 @pytest.mark.parametrize("transmit", [1, 2])

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from rail_wayside.ranging.association import Candidate, LineOrder, associate
+from rail_wayside.ranging.association import RunningOrder, TrainCandidate, associate
 
 
 def ways(*places_m: float) -> dict[tuple[int, int], float | None]:
@@ -15,17 +15,17 @@ def ways(*places_m: float) -> dict[tuple[int, int], float | None]:
     return {(one, other): places_m[other] - places_m[one] for one, other in pairs}
 
 
-def lost(train: int, *readings: int) -> Candidate:
-    return Candidate(train, False, dict.fromkeys(readings, 0.5))
+def lost(train: int, *readings: int) -> TrainCandidate:
+    return TrainCandidate(train, False, dict.fromkeys(readings, 0.5))
 
 
-def followed(train: int, **misses: float) -> Candidate:
-    return Candidate(train, True, {int(name[1:]): miss for name, miss in misses.items()})
+def followed(train: int, **misses: float) -> TrainCandidate:
+    return TrainCandidate(train, True, {int(name[1:]): miss for name, miss in misses.items()})
 
 
-def order_of(*trains: int) -> LineOrder:
+def order_of(*trains: int) -> RunningOrder:
     """Return what is known when the trains were once seen in this order, the rear one first."""
-    order = LineOrder()
+    order = RunningOrder()
     for place, rear in enumerate(trains):
         for ahead, front in enumerate(trains[place + 1 :], start=1):
             order.learn(rear, front, 100.0 * ahead)
@@ -34,16 +34,16 @@ def order_of(*trains: int) -> LineOrder:
 
 def test_a_followed_train_keeps_its_reading() -> None:
     candidates = [lost(0, 0), followed(1, r0=0.2)]
-    assert associate(candidates, {}, LineOrder()) == {1: 0}
+    assert associate(candidates, {}, RunningOrder()) == {1: 0}
 
 
 def test_the_nearer_of_two_readings_is_that_of_a_followed_train() -> None:
     candidates = [followed(0, r0=0.7, r1=0.1)]
-    assert associate(candidates, ways(0.0, 9.0), LineOrder()) == {0: 1}
+    assert associate(candidates, ways(0.0, 9.0), RunningOrder()) == {0: 1}
 
 
 def test_a_lost_train_alone_is_found() -> None:
-    assert associate([lost(0, 0)], {}, LineOrder()) == {0: 0}
+    assert associate([lost(0, 0)], {}, RunningOrder()) == {0: 0}
 
 
 def test_one_reading_for_two_lost_trains_is_nobodys() -> None:
@@ -51,7 +51,7 @@ def test_one_reading_for_two_lost_trains_is_nobodys() -> None:
 
 
 def test_two_readings_for_one_lost_train_are_not_its_own() -> None:
-    assert associate([lost(0, 0, 1)], ways(0.0, 50.0), LineOrder()) == {}
+    assert associate([lost(0, 0, 1)], ways(0.0, 50.0), RunningOrder()) == {}
 
 
 @pytest.mark.parametrize(("rear", "front"), [(0, 1), (1, 0)])
@@ -62,7 +62,7 @@ def test_two_lost_trains_are_found_in_the_order_they_were_in(rear: int, front: i
 
 
 def test_two_lost_trains_in_no_known_order_stay_lost() -> None:
-    assert associate([lost(0, 0, 1), lost(1, 0, 1)], ways(0.0, 200.0), LineOrder()) == {}
+    assert associate([lost(0, 0, 1), lost(1, 0, 1)], ways(0.0, 200.0), RunningOrder()) == {}
 
 
 def test_a_lost_train_does_not_pass_one_that_is_followed() -> None:
@@ -91,4 +91,4 @@ def test_groups_that_share_no_reading_do_not_disturb_each_other() -> None:
 
 def test_a_chain_of_shared_readings_is_one_group() -> None:
     candidates = [lost(0, 0, 1), lost(1, 1, 2), lost(2, 2)]
-    assert associate(candidates, ways(0.0, 300.0, 600.0), LineOrder()) == {0: 0, 1: 1, 2: 2}
+    assert associate(candidates, ways(0.0, 300.0, 600.0), RunningOrder()) == {0: 0, 1: 1, 2: 2}

@@ -12,10 +12,10 @@ from rail_signals.delay import fractional_delay
 from rail_signals.phasors import rotation
 from rail_signals.ranging.bounds import two_way_range_variance_bound
 from rail_signals.ranging.phase_range import range_to_phase_rad, unambiguous_range_m
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import RangingSignal, modulate
 from rail_signals.ranging.transponder import transpond
-from rail_wayside.ranging.ranging_station import RangingStation, Reading
+from rail_wayside.ranging.ranging_station import BurstReading, RangingStation
 
 Burst = NDArray[np.complex128]
 C_MPS = 299_792_458.0
@@ -48,7 +48,7 @@ class Chain:
     def __init__(self, signal: RangingSignal = SIGNAL, seed: int = 1) -> None:
         self._signal = signal
         self._rng = np.random.default_rng(seed)
-        self._receiver = LineReceiver(signal)
+        self._receiver = FmToneReceiver(signal)
         self._sent = modulate(signal, np.zeros(len(signal.tones_hz)))
 
     def burst(self, range_m: float, snr_down: float, snr_up: float) -> Burst:
@@ -160,7 +160,7 @@ def test_noise_is_nothing_heard(comparator: str) -> None:
     unit, rng = station(comparator), np.random.default_rng(3)
     for power_mw in (0.0, NOISE_MW, 2.0 * NOISE_MW):
         for _ in range(50):
-            assert unit.read(noise(rng, power_mw)) == Reading(math.inf, math.inf)
+            assert unit.read(noise(rng, power_mw)) == BurstReading(math.inf, math.inf)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, complex(0.0, math.nan)])

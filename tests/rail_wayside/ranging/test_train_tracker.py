@@ -8,8 +8,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 
-from rail_wayside.ranging.train_tracker import CONFIRMED_S, GATE_M, Fix, Reading, ZoneTracker
-from rail_wayside.ranging.zone_map import Zone, ZoneMap
+from rail_wayside.ranging.train_tracker import (
+    CONFIRMED_S,
+    GATE_M,
+    TrainFix,
+    ZoneReading,
+    ZoneTracker,
+)
+from rail_wayside.ranging.zone_map import MappedZone, ZoneMap
 
 TICK_S = 0.1
 LENGTH_M = 200.0
@@ -34,7 +40,9 @@ def line() -> ZoneMap:
     s_m = np.arange(0.0, 2.0 * LENGTH_M + 0.25, 0.25)
     distance_m = np.hypot(s_m, MAST_M)
     zones = [
-        Zone(name, f"site_{name}", track, start_m, start_m + LENGTH_M, start_m + s_m, distance_m)
+        MappedZone(
+            name, f"site_{name}", track, start_m, start_m + LENGTH_M, start_m + s_m, distance_m
+        )
         for name, (track, start_m, _) in PLAN.items()
     ]
     return ZoneMap(zones, {name: after for name, (*_, after) in PLAN.items()})
@@ -78,7 +86,7 @@ class Wayside:
         self.time_s = 0.0
         self.tracker = self._tracker
 
-    def tick(self, time_s: float) -> dict[str, Fix]:
+    def tick(self, time_s: float) -> dict[str, TrainFix]:
         self.time_s = time_s
         heard: dict[str, list[float]] = {name: [] for name in PLAN}
         for run in self._runs.values():
@@ -97,10 +105,10 @@ class Wayside:
                 range_m = math.nan
             range_m = self.extra.get(name, range_m)
             variance_m2 = SIGMA_M**2 if math.isfinite(range_m) else math.inf
-            readings[name] = Reading(range_m, variance_m2)
+            readings[name] = ZoneReading(range_m, variance_m2)
         return {fix.train: fix for fix in self._tracker.update(time_s, readings)}
 
-    def error_m(self, fix: Fix) -> float:
+    def error_m(self, fix: TrainFix) -> float:
         """Error of a known position; infinite on the wrong track."""
         place = self._runs[fix.train](self.time_s)
         if place is None or fix.track != place[0]:
@@ -108,7 +116,7 @@ class Wayside:
         return fix.chainage_m - place[1]
 
 
-def known(fix: Fix) -> bool:
+def known(fix: TrainFix) -> bool:
     return math.isfinite(fix.variance_m2)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rail_signals.arrays import FloatArray
-from rail_wayside.ranging.zone_map import NEIGHBOURHOOD, Zone, ZoneMap
+from rail_wayside.ranging.zone_map import NEIGHBOURHOOD, MappedZone, ZoneMap
 
 OFFSET_M, HEIGHT_M = 3.0, 5.0
 
@@ -30,11 +30,13 @@ def fine_then_coarse(length_m: float) -> FloatArray:
     return np.concatenate([np.arange(0.0, 20.0, 0.05), np.arange(20.0, length_m + 0.5, 1.0)])
 
 
-def zone(name: str = "z", start_m: float = 500.0, length_m: float = 200.0, **more: str) -> Zone:
+def zone(
+    name: str = "z", start_m: float = 500.0, length_m: float = 200.0, **more: str
+) -> MappedZone:
     """Return a zone on straight track with a table that goes on through the next zone."""
     s_m = fine_then_coarse(2.0 * length_m)
     settings = {"site": f"wrs_{name}", "track": "main", **more}
-    return Zone(
+    return MappedZone(
         name, settings["site"], settings["track"], start_m, start_m + length_m, start_m + s_m,
         straight(s_m),
     )  # fmt: skip
@@ -47,7 +49,7 @@ def zone(name: str = "z", start_m: float = 500.0, length_m: float = 200.0, **mor
 def test_every_place_of_a_zone_is_found_again(radius_m: float) -> None:
     s_m = fine_then_coarse(400.0)
     distance_m = straight(s_m) if math.isinf(radius_m) else curved(radius_m, s_m)
-    here = Zone("z", "wrs", "main", 1000.0, 1200.0, 1000.0 + s_m, distance_m)
+    here = MappedZone("z", "wrs", "main", 1000.0, 1200.0, 1000.0 + s_m, distance_m)
     for way_m in np.linspace(0.5, 399.0, 300):
         array = np.array(way_m)
         exact = straight(array) if math.isinf(radius_m) else curved(radius_m, array)
@@ -125,16 +127,16 @@ def test_the_way_is_the_same_there_and_back(
     start: tuple[str, float], end: tuple[str, float], way_m: float
 ) -> None:
     lines = junction()
-    assert lines.way_m(*start, *end) == pytest.approx(way_m)
-    assert lines.way_m(*end, *start) == pytest.approx(-way_m)
+    assert lines.path_distance_m(*start, *end) == pytest.approx(way_m)
+    assert lines.path_distance_m(*end, *start) == pytest.approx(-way_m)
 
 
 @pytest.mark.parametrize(("one", "other"), [("c", "e"), ("c", "f"), ("d", "f")])
 def test_no_train_gets_from_one_leg_to_the_other_without_reversing(one: str, other: str) -> None:
     lines = junction()
     here, there = lines.zones[one], lines.zones[other]
-    assert lines.way_m(one, here.start_m, other, there.start_m) is None
-    assert lines.way_m(other, there.start_m, one, here.start_m) is None
+    assert lines.path_distance_m(one, here.start_m, other, there.start_m) is None
+    assert lines.path_distance_m(other, there.start_m, one, here.start_m) is None
 
 
 def test_what_is_far_away_is_out_of_reach() -> None:
@@ -142,7 +144,7 @@ def test_what_is_far_away_is_out_of_reach() -> None:
     zones = [zone(name, 200.0 * n) for n, name in enumerate(names)]
     lines = ZoneMap(zones, {a: [b] for a, b in itertools.pairwise(names)})
     for n, name in enumerate(names):
-        way_m = lines.way_m("z0", 0.0, name, 200.0 * n)
+        way_m = lines.path_distance_m("z0", 0.0, name, 200.0 * n)
         assert way_m == (200.0 * n if n <= NEIGHBOURHOOD else None)
 
 

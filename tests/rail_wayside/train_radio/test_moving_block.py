@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from rail_msgs_py.train_radio.movement_authority import MOST_STEPS, LimitStep, MovementAuthority
 from rail_msgs_py.train_radio.train_report import LocationReport
 from rail_wayside.train_radio.moving_block import (
-    Authority,
+    IssuedAuthority,
     MovingBlock,
     Segment,
     TrainStart,
@@ -54,7 +54,7 @@ def told(number: int, offset_m: float, half_m: float = 0.0, **more: object) -> L
     return LocationReport(**{**fields, **more})  # type: ignore[arg-type]
 
 
-def given_to(block: MovingBlock, train: int, time_s: float) -> Authority:
+def given_to(block: MovingBlock, train: int, time_s: float) -> IssuedAuthority:
     authority = block.authority(train, time_s)
     assert authority is not None
     return authority
@@ -526,7 +526,7 @@ def run(dice: Random, trains: list[Sim], loss: float, late_s: float, ticks: int)
             sim = next(sim for sim in trains if sim.number == number)
             if isinstance(what, LocationReport):
                 block.report(number, made_s, what)
-            elif isinstance(what, Authority) and made_s > sim.issued_s:
+            elif isinstance(what, IssuedAuthority) and made_s > sim.issued_s:
                 sim.issued_s, sim.valid_s = made_s, made_s + what.validity_s
                 sim.end_m = sim.direction * to_telegram(what).end_of_authority_m
         for sim in trains:

@@ -37,7 +37,7 @@ def medium(*faults: ReferenceFault, **changes: object) -> ReferenceMedium:
         "noise_figure_db": 0.0,
         "path_loss_exponent": 2.0,
         "extra_loss_db": 0.0,
-        "reach_m": 2000.0,
+        "coverage_range_m": 2000.0,
     }
     description = ReferenceDescription(
         stations=stations,
@@ -146,7 +146,10 @@ def test_a_dead_station_is_silent_and_a_detuned_one_is_off_while_it_lasts() -> N
 
 
 def test_nothing_is_heard_past_the_reach_or_off_the_line() -> None:
-    assert medium(reach_m=500.0).receive(0, 0.0, state("straight", 2900.0, 0.0), tones()) == {}
+    assert (
+        medium(coverage_range_m=500.0).receive(0, 0.0, state("straight", 2900.0, 0.0), tones())
+        == {}
+    )
     off = state("straight", 1300.0, 0.0)
     off[0, -1] = 0.0
     assert medium().receive(0, 0.0, off, tones()) == {}

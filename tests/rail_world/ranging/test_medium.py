@@ -10,9 +10,14 @@ import pytest
 
 from rail_msgs_py.topics.world import STATE
 from rail_signals.arrays import ComplexArray
-from rail_signals.ranging.receiver import LineReceiver, ToneEstimate
+from rail_signals.ranging.receiver import FmToneReceiver, ToneEstimate
 from rail_signals.ranging.signal import RangingSignal, modulate
-from rail_world.ranging.description import AntennaPattern, Fault, RadioDescription, StationAntenna
+from rail_world.ranging.description import (
+    AntennaPattern,
+    RadioDescription,
+    RadioFault,
+    StationAntenna,
+)
 from rail_world.ranging.medium import Paths, RadioMedium, Reception, TrainAntennas
 from rail_world.ranging.medium_node import antennas_of
 
@@ -40,7 +45,7 @@ def antenna(
         boresight=towards,
         downlink_channel=channels[0],
         uplink_channel=channels[1],
-        reach_m=reach_m,
+        coverage_range_m=reach_m,
     )
 
 
@@ -93,7 +98,7 @@ def hear(radio: RadioMedium, trains: TrainAntennas, **more: Any) -> Reception:
 
 
 def read(received: Reception, max_offset_hz: float = 5e3) -> ToneEstimate:
-    return LineReceiver(SIGNAL, max_offset_hz=max_offset_hz).estimate(received.samples)
+    return FmToneReceiver(SIGNAL, max_offset_hz=max_offset_hz).estimate(received.samples)
 
 
 def friis_dbm(power_dbm: float, gains_dbi: float, distance_m: float, carrier_hz: float) -> float:
@@ -300,7 +305,7 @@ def test_a_silent_station_is_not_heard_and_a_foreign_channel_neither() -> None:
 
 
 def test_a_dead_station_neither_sends_nor_hears() -> None:
-    fault = Fault(kind="dead_station", station="wrs1", from_s=10.0, to_s=20.0)
+    fault = RadioFault(kind="dead_station", station="wrs1", from_s=10.0, to_s=20.0)
     radio = medium(antenna(), antenna(site="wrs2"), faults=(fault,))
     paths = radio.paths(at((100.0, 0.0)))
     for time_s, alive in ((9.9, True), (10.0, False), (19.9, False), (20.0, True)):
@@ -312,7 +317,7 @@ def test_a_dead_station_neither_sends_nor_hears() -> None:
 
 
 def test_every_antenna_of_a_dead_site_is_dead() -> None:
-    fault = Fault(kind="dead_station", station="wrs1", from_s=0.0, to_s=1e6)
+    fault = RadioFault(kind="dead_station", station="wrs1", from_s=0.0, to_s=1e6)
     radio = medium(
         antenna(), antenna(zone="zone2"), antenna(site="wrs2", zone="zone3"), faults=(fault,)
     )

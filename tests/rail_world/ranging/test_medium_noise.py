@@ -10,7 +10,12 @@ import pytest
 
 from rail_signals.arrays import ComplexArray
 from rail_signals.ranging.signal import RangingSignal, modulate
-from rail_world.ranging.description import AntennaPattern, Fault, RadioDescription, StationAntenna
+from rail_world.ranging.description import (
+    AntennaPattern,
+    RadioDescription,
+    RadioFault,
+    StationAntenna,
+)
 from rail_world.ranging.medium import RadioMedium, Reception, TrainAntennas
 
 C_MPS = 299_792_458.0
@@ -29,7 +34,7 @@ def antenna(x_m: float, site: str, channels: tuple[int, int] = (1, 2)) -> Statio
         boresight=(1.0, 0.0, 0.0),
         downlink_channel=channels[0],
         uplink_channel=channels[1],
-        reach_m=5000.0,
+        coverage_range_m=5000.0,
     )
 
 
@@ -200,7 +205,7 @@ def test_trains_on_one_channel_add() -> None:
 def jammed(**fault: Any) -> RadioMedium:
     settings = {"kind": "jam", "channel": 1, "power_dbm": 20.0, "from_s": 1.0, "to_s": 2.0}
     isotropic = AntennaPattern(gain_dbi=0.0, beamwidth_deg=60.0, front_to_back_db=0.0)
-    return medium(faults=(Fault(**{**settings, **fault}),), train_pattern=isotropic)
+    return medium(faults=(RadioFault(**{**settings, **fault}),), train_pattern=isotropic)
 
 
 def test_a_jammer_arrives_with_the_power_of_friis() -> None:
@@ -230,7 +235,7 @@ def test_antennas_turned_away_suppress_a_jammer() -> None:
     ratios = []
     for x_m in (300.0, -300.0):
         place_m = (x_m, 0.0, 0.0)
-        fault = Fault(
+        fault = RadioFault(
             kind="jam", channel=2, power_dbm=20.0, from_s=0.0, to_s=1.0, position_m=place_m
         )
         radio = medium(faults=(fault,))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rail_signals.train_bus.bus_line import BusLine, CableSection, Coupler, Stub, Termination
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.cascade import transfer
 from rail_signals.train_bus.consist import CarRun, Consist, Deviations, Tolerances
@@ -21,12 +22,11 @@ from rail_signals.train_bus.faults import (
     WrongCable,
 )
 from rail_signals.train_bus.frame import BusFrameFormat
-from rail_signals.train_bus.line import Coupler, Line, Section, Stub, Termination
 from rail_signals.train_bus.receiver import BusFrameReceiver
 from rail_signals.train_bus.tdr.measured_trace import step_edge
 from rail_signals.train_bus.tdr.reflectometer import Reflectometer, measure_consist
 from rail_world.train_bus.description import BusDescription, BusFaultDescription, TrainBus
-from rail_world.train_bus.fault_growth import contact, fault_of, grown, share
+from rail_world.train_bus.fault_growth import contact, fault_of, grown, growth_fraction
 from rail_world.train_bus.medium import BusMedium
 
 FRAME = BusFrameFormat()
@@ -59,7 +59,7 @@ WRONG: dict[str, Any] = {
 EXACT = Tolerances(**dict.fromkeys(Tolerances.__dataclass_fields__, 1e-12))  # type: ignore[arg-type]
 LOSSLESS = Cable.from_impedance(105.0, 0.66)
 LOSSY = Cable.from_impedance(110.0, 0.66, 0.05, 0.0, 5e-5)
-NODE = Stub(Section(LOSSY, 0.3), Termination(1e4), 50e-12)
+NODE = Stub(CableSection(LOSSY, 0.3), Termination(1e4), 50e-12)
 
 
 def consist(
@@ -92,7 +92,7 @@ def test_a_matched_line_without_loss_is_a_delay() -> None:
     drawing = consist()
     got = medium(drawing).carry(0, 0.0, WAVE, to_tail=True).samples
     assert len(got) == len(WAVE) + 40
-    delay = drawing.line().delay_s * FRAME.sample_rate_hz
+    delay = drawing.bus_line().delay_s * FRAME.sample_rate_hz
     length = 2 * len(got)
     turn = np.exp(-2j * np.pi * np.arange(length // 2 + 1) / length * delay)
     later = np.fft.irfft(np.fft.rfft(WAVE, length) * turn, length)[: len(got)]
@@ -123,11 +123,11 @@ def test_nothing_passes_a_cut_and_little_a_short() -> None:
 
 
 def test_the_way_back_is_that_of_the_line_turned_round() -> None:
-    line = medium(TRAIN).line
-    turned = Line(tuple(reversed(line.elements)), Termination(SHARED["source_ohm"]))
+    bus_line = medium(TRAIN).bus_line
+    turned = BusLine(tuple(reversed(bus_line.elements)), Termination(SHARED["source_ohm"]))
     frequency_hz = np.array([1e5, 5e5, 1e6, 3e6])
-    load_ohm = line.termination.resistance_ohm
-    there = transfer(line, frequency_hz, SHARED["source_ohm"])[-1]
+    load_ohm = bus_line.termination.resistance_ohm
+    there = transfer(bus_line, frequency_hz, SHARED["source_ohm"])[-1]
     back = transfer(turned, frequency_hz, load_ohm)[-1]
     assert back == pytest.approx(there * SHARED["source_ohm"] / load_ohm, rel=1e-12)
     here = medium(TRAIN)
@@ -208,12 +208,14 @@ def test_a_contact_that_is_not_firm_changes_from_tick_to_tick_and_trace_to_trace
 
 
 def test_laws_of_growth() -> None:
-    assert share("linear", 10.0, 20.0, 9.0) == 0.0
-    assert share("linear", 10.0, 20.0, 12.5) == 0.25
-    assert share("exponential", 10.0, 20.0, 10.0) == 0.0
-    assert share("exponential", 10.0, 20.0, 15.0) == pytest.approx(1.0 / (1.0 + 1000.0**0.5))
+    assert growth_fraction("linear", 10.0, 20.0, 9.0) == 0.0
+    assert growth_fraction("linear", 10.0, 20.0, 12.5) == 0.25
+    assert growth_fraction("exponential", 10.0, 20.0, 10.0) == 0.0
+    assert growth_fraction("exponential", 10.0, 20.0, 15.0) == pytest.approx(
+        1.0 / (1.0 + 1000.0**0.5)
+    )
     for law in ("linear", "exponential"):
-        assert share(law, 10.0, 20.0, 25.0) == 1.0  # type: ignore[arg-type]
+        assert growth_fraction(law, 10.0, 20.0, 25.0) == 1.0  # type: ignore[arg-type]
     assert contact(0.3, 0.0) == 1.0
     assert math.log(contact(0.3, 1.0)) == pytest.approx(0.3, abs=0.026)
 
@@ -222,7 +224,7 @@ def test_growth_comes_in_steps_of_a_percent_and_stays() -> None:
     wrong = fault("bad_splice", at_m=1.0, from_s=10.0, to_s=20.0)
     assert [grown(wrong, t) for t in (0.0, 10.0)] == [0.0, 0.0]
     for time_s in np.linspace(10.1, 20.0, 50):
-        exact = share("linear", 10.0, 20.0, float(time_s))
+        exact = growth_fraction("linear", 10.0, 20.0, float(time_s))
         assert grown(wrong, float(time_s)) == pytest.approx(exact, rel=0.0051)
     assert grown(wrong, 1e6) == 1.0
     cut = fault("open", at_m=1.0, from_s=10.0, to_s=20.0)

@@ -10,8 +10,8 @@ from rail_msgs_py.topics.train_radio import STRIKES
 from rail_msgs_py.train_radio.safe_frame import (
     FRAME_BYTES,
     VERSION,
+    FrameKind,
     Header,
-    Kind,
     read_header,
     write_header,
 )
@@ -28,7 +28,7 @@ TRAINS = (1, 2)
 def frame_of(number: int, train: int, *, upward: bool) -> bytes:
     """A frame that looks like one, told from others by its number."""
     ends = (train, CONTROLLER_IDENTITY) if upward else (CONTROLLER_IDENTITY, train)
-    header = Header(VERSION, Kind.LOCATION_REPORT, 32, *ends, number, number * TICK_NS, 0, 7)
+    header = Header(VERSION, FrameKind.LOCATION_REPORT, 32, *ends, number, number * TICK_NS, 0, 7)
     return write_header(header).ljust(FRAME_BYTES, b"\0")
 
 

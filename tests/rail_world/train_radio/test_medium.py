@@ -52,7 +52,7 @@ def medium(count: int = 1, seed: int = 1, **more: Any) -> CbtcMedium:
         "train_power_dbm": 30.0,
         "noise_figure_db": 6.0,
         "path_loss_exponent": 3.0,
-        "reach_m": 3000.0,
+        "coverage_range_m": 3000.0,
         "rician_factor": 0.0,
         "snr_offset_db": 0.0,
         **more,
@@ -321,11 +321,11 @@ def test_the_line_of_sight_shifts_up_before_the_mast_and_down_behind() -> None:
 
 
 def test_out_of_reach_nothing_is_delivered() -> None:
-    radio = medium(3, reach_m=500.0)
+    radio = medium(3, coverage_range_m=500.0)
     state = at(1400.0, 1600.0, 1400.0)
     state[2, 9] = 0.0  # not on the line
     links = radio.links(0, 0.0, state)
-    assert links.in_reach.tolist() == [[True, False, False], [False, False, False]]
+    assert links.in_coverage.tolist() == [[True, False, False], [False, False, False]]
     windows = {(t, c): [(0, 10)] for t in range(3) for c in (1, 2)}
     assert list(radio.downlink(links, {0: [ones()], 1: [ones()]}, windows)) == [(0, 1)]
     sent = {train: (1, [ones()]) for train in range(3)}

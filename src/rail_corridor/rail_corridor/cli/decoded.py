@@ -63,8 +63,8 @@ def _table(table: Table) -> str:
     lines = []
     for name, values in zip(table.rows, table.values, strict=True):
         pairs = zip(table.columns, values, strict=True)
-        figures = "  ".join(f"{column} {value:.6g}" for column, value in pairs)
-        lines.append(f"{_time(table.stamp_ns)}  {name}: {figures}")
+        cells = "  ".join(f"{column} {value:.6g}" for column, value in pairs)
+        lines.append(f"{_time(table.stamp_ns)}  {name}: {cells}")
     return "\n".join(lines)
 
 

@@ -19,7 +19,7 @@ def add_to(app: typer.Typer) -> None:
 
 def figures(
     directory: Annotated[
-        Path, typer.Argument(help="Where the pictures go.", metavar="[OUTDIR]")
+        Path, typer.Argument(help="Where the figures go.", metavar="[OUTDIR]")
     ] = Path("figures"),
     only: Annotated[
         list[str] | None,
@@ -53,25 +53,25 @@ def figures(
             typer.echo(f"elsewhere: {what}: {how}")
         return
     of_run = [name for name in wanted if name in run_figures.FIGURES]
-    found = dict(FIGURES)
+    available = dict(FIGURES)
     if recording is not None and of_run:
         from rail_corridor.recording.mcap_file import RecordingFile
         from rail_corridor.report.from_recording import run_of
 
         with RecordingFile(recording) as file:
             run = run_of(file)
-        found |= run_figures.pictures_of(run)
-    pictures = {name: found[name] for name in wanted if name in found}
-    for path in draw(directory, pictures):
+        available |= run_figures.figure_specs_of(run)
+    specs = {name: available[name] for name in wanted if name in available}
+    for path in draw(directory, specs):
         typer.echo(path)
-    if pictures:
-        typer.echo(write_index(directory, pictures))
+    if specs:
+        typer.echo(write_index(directory, specs))
     if of_run and recording is None:
         typer.echo(
             f"not drawn: {', '.join(of_run)}: they need a run, as of 'rail run moving_block "
             "--record run.mcap', then 'rail figures --from run.mcap'"
         )
-    elif missing := [name for name in of_run if name not in pictures]:
+    elif missing := [name for name in of_run if name not in specs]:
         typer.echo(f"not drawn: {', '.join(missing)}: the run has nothing for them")
 
 
@@ -80,5 +80,5 @@ def _chosen(names: Iterable[str], patterns: list[str] | None) -> list[str]:
     names = list(names)
     for pattern in patterns or ():
         if not any(fnmatchcase(name, pattern) for name in names):
-            raise UsageError(f"--only: {pattern!r}: is none of {', '.join(names)}")
+            raise UsageError(f"--only: {pattern!r}: is not one of {', '.join(names)}")
     return [n for n in names if not patterns or any(fnmatchcase(n, p) for p in patterns)]

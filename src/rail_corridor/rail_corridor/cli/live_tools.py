@@ -77,8 +77,8 @@ def list_topics() -> int:
             known.update(dict(node.get_topic_names_and_types()))
             if len(known) != settled["count"]:
                 settled.update(count=len(known), since=time.monotonic())
-            found = STATE.name() in known  # the clock may be somebody else's
-            return found and time.monotonic() - settled["since"] > SETTLED_S
+            matches = STATE.name() in known  # the clock may be somebody else's
+            return matches and time.monotonic() - settled["since"] > SETTLED_S
 
         if not _when(node, is_settled, DISCOVERY_S):
             console.print("no corridor is running on this host and ROS_DOMAIN_ID")
@@ -99,15 +99,15 @@ def list_topics() -> int:
 
 def _find(node: Node, topic: str) -> Any:
     """Message class of a topic, None if nobody publishes it."""
-    found: list[str] = []
+    matches: list[str] = []
 
     def look() -> bool:
-        found[:] = dict(node.get_topic_names_and_types()).get(topic, [])
-        return bool(found) and node.count_publishers(topic) > 0
+        matches[:] = dict(node.get_topic_names_and_types()).get(topic, [])
+        return bool(matches) and node.count_publishers(topic) > 0
 
     if not _when(node, look, DISCOVERY_S):
         return None
-    package, _, name = found[0].partition("/msg/")
+    package, _, name = matches[0].partition("/msg/")
     return getattr(importlib.import_module(f"{package}.msg"), name)
 
 

@@ -52,7 +52,7 @@ def campaign(
     from rich.console import Console
 
     from rail_corridor.run.child_run import RunFailedError
-    from rail_corridor.studies.handover import Row, print_rows, run_campaign, write_rows
+    from rail_corridor.studies.handover import HandoverRow, print_rows, run_campaign, write_rows
     from rail_corridor.studies.handover_scenarios import situations
 
     console = Console()
@@ -64,7 +64,7 @@ def campaign(
         from rail_corridor.studies.threat_table import threat_campaign
 
         raise typer.Exit(threat_campaign(frames, seed, console, json))
-    rows: list[Row] = []
+    rows: list[HandoverRow] = []
     try:
         rows.extend(run_campaign(situations(), crossings, seed, console))
     except KeyboardInterrupt:
@@ -82,14 +82,14 @@ def campaign(
 def sweep(
     what: Annotated[str, typer.Argument(help="What to vary: link_margin.", metavar="WHAT")],
     out: Annotated[
-        Path, typer.Option("--out", help="Folder for picture and figures.", metavar="DIR")
+        Path, typer.Option("--out", help="Folder for the figure and the numbers.", metavar="DIR")
     ] = Path("link_margin"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points.")] = False,
     seeds: Annotated[
         int, typer.Option("--seeds", help="Runs of each point.", metavar="N", min=1, max=100)
     ] = 1,
 ) -> None:
-    """Run one situation over a range of parameters: a table, a picture, and JSON."""
+    """Run one situation over a range of parameters: a table, a figure, and JSON."""
     check_choice("WHAT", what, ("link_margin",))
     if out.exists() and not out.is_dir():
         raise UsageError(f"--out: {out}: is not a directory")
@@ -125,7 +125,7 @@ def accuracy(
         typer.Option("--speed", help="Speed [km/h]; repeatable.", metavar="KMH"),
     ] = None,
     out: Annotated[
-        Path, typer.Option("--out", help="Picture: .png, .svg or .pdf.", metavar="FILE")
+        Path, typer.Option("--out", help="Figure: .png, .svg or .pdf.", metavar="FILE")
     ] = Path("accuracy.png"),
 ) -> None:
     """Draw the accuracy that geometry allows to Doppler positions along a line; starts nothing."""

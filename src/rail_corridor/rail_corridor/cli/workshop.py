@@ -31,7 +31,7 @@ def tdr(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", help="Draw a picture.", metavar="FIGURE.png")
+        Path | None, typer.Option("--out", help="Draw a figure.", metavar="FIGURE.png")
     ] = None,
     end: Annotated[
         str, typer.Option("--end", help="At the far end: terminated, open, short.", metavar="HOW")

@@ -17,7 +17,7 @@ from rail_corridor.equipment.track_code.subsystem import TRACK_CODE
 from rail_corridor.equipment.train_bus.subsystem import TRAIN_BUS
 from rail_corridor.equipment.train_radio.subsystem import TRAIN_RADIO
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.faults import Fault, TrainStop, WheelSlip
+from rail_corridor.scenario.faults import Fault, TrainStopFault, WheelSlipFault
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import tick, world
 from rail_msgs_py.topics.topic import Topic
@@ -84,7 +84,7 @@ def _kind_of_fault(fault: type[Fault]) -> str:
 _OWN: Final[dict[str, set[str]]] = {
     "name": set(),
     "section": set(Scenario.model_fields),
-    "kind of fault": {_kind_of_fault(fault) for fault in (TrainStop, WheelSlip)},
+    "kind of fault": {_kind_of_fault(fault) for fault in (TrainStopFault, WheelSlipFault)},
     "option": set(),
     "kind of node": {WORLD.name},
     "topic": {topic.pattern for topic in (*tick.TOPICS, *world.TOPICS)},

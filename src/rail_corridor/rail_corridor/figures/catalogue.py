@@ -9,7 +9,7 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from rail_corridor.plotting import STYLE, Picture
+from rail_corridor.plotting import STYLE, FigureSpec
 
 from . import doppler as doppler_figures
 from . import ranging as ranging_figures
@@ -18,7 +18,7 @@ from . import train_bus as train_bus_figures
 from . import train_radio as train_radio_figures
 
 #: Name of a figure -> what draws it, and what to see.
-FIGURES: dict[str, Picture] = {
+FIGURES: dict[str, FigureSpec] = {
     **ranging_figures.FIGURES,
     **doppler_figures.FIGURES,
     **train_bus_figures.FIGURES,
@@ -34,32 +34,32 @@ ELSEWHERE = {
 }
 
 
-def draw(directory: Path, pictures: Mapping[str, Picture]) -> Iterator[Path]:
+def draw(directory: Path, specs: Mapping[str, FigureSpec]) -> Iterator[Path]:
     """Draw figures into a directory; yield the file of each.
 
     Parameters
     ----------
     directory : Path
         Made if it is not there.
-    pictures : mapping of str to Picture
+    specs : mapping of str to FigureSpec
         By name, as `FIGURES`.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    for name, picture in pictures.items():
+    for name, spec in specs.items():
         with mpl.rc_context(STYLE):
             figure = Figure()
-            picture.draw(figure)
+            spec.draw(figure)
             path = directory / f"{name}.png"
             figure.savefig(path, metadata={"Software": None})
         yield path
 
 
-def write_index(directory: Path, pictures: Mapping[str, Picture]) -> Path:
+def write_index(directory: Path, specs: Mapping[str, FigureSpec]) -> Path:
     """Write a page of all figures with their captions; returns its file."""
     parts = [
         f'<figure id="{name}">\n<img src="{name}.png" alt="{name}">\n'
-        f"<figcaption><b>{name}</b>: {html.escape(picture.caption)}</figcaption>\n</figure>"
-        for name, picture in pictures.items()
+        f"<figcaption><b>{name}</b>: {html.escape(spec.caption)}</figcaption>\n</figure>"
+        for name, spec in specs.items()
     ]
     path = directory / "index.html"
     path.write_text(_PAGE.format(figures="\n".join(parts)), encoding="utf-8")

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rail_corridor.loading.loader import load_scenario
-from rail_corridor.plotting import COLOURS, Picture
+from rail_corridor.plotting import COLOURS, FigureSpec
 from rail_corridor.studies.accuracy import accuracy_of, draw_line
 from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
@@ -96,11 +96,11 @@ def _mixed(figure: Figure) -> None:
         both = shifts_hz(section, place)
         chosen = MIXED.position(both, 1.01 * AHEAD_HZ)
         assert chosen is not None
-        found_m = chosen[1] if chosen[0] == "straight" else 600.0 * (chosen[1] - arc.from_rad)
-        label = f"train at {found_m:.0f} m: {chosen[0]} chosen"
+        estimated_m = chosen[1] if chosen[0] == "straight" else 600.0 * (chosen[1] - arc.from_rad)
+        label = f"train at {estimated_m:.0f} m: {chosen[0]} chosen"
         axes.plot(x, _root(straight.function(x, both)), dashes, color=colour, label=label)
         axes.plot(along, _root(arc.function(theta, both)), dashes, color=colour)
-        axes.plot(found_m, 1.5e-2, "o", color=colour, ms=8)
+        axes.plot(estimated_m, 1.5e-2, "o", color=colour, ms=8)
     axes.axvline(0.0, color="black", lw=0.8)
     axes.text(-10.0, 3e3, "straight  ", ha="right")
     axes.text(10.0, 3e3, "  arc of 600 m", ha="left")
@@ -121,23 +121,23 @@ def _bound(figure: Figure) -> None:
     )
 
 
-FIGURES: Final[dict[str, Picture]] = {
-    "doppler_straight": Picture(
+FIGURES: Final[dict[str, FigureSpec]] = {
+    "doppler_straight": FigureSpec(
         _straight,
         "Claims 4 and 11: the position function of two stations on a straight. Its zero is where "
         "the train is; an offset of 0.1 ppm that nobody takes off moves it by hundreds of metres.",
     ),
-    "doppler_arc": Picture(
+    "doppler_arc": FigureSpec(
         _arc,
         "Claims 5 and 12: the same on an arc, for two places of the train. For the second there "
         "are two zeros: two stations leave it open, which the positioner calls ambiguous.",
     ),
-    "doppler_mixed": Picture(
+    "doppler_mixed": FigureSpec(
         _mixed,
         "Claims 6 and 13: a straight with an arc behind it. Dots: the place chosen, once on the "
         "straight and once on the arc.",
     ),
-    "doppler_bound_along_line": Picture(
+    "doppler_bound_along_line": FigureSpec(
         _bound,
         "Least standard deviation of a position from one block along the line of the scenario "
         "'sensors' at three speeds. It is best where a train passes a station, since the shift "

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from rail_corridor.equipment.ranging.layout import Zone, layout_of
 from rail_corridor.equipment.ranging.run_figures import pair_colour
 from rail_corridor.loading.loader import load_scenario
-from rail_corridor.plotting import COLOURS, Picture
+from rail_corridor.plotting import COLOURS, FigureSpec
 from rail_corridor.scenario.model import Scenario
 from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
@@ -25,7 +25,7 @@ from rail_signals.ranging.phase_range import (
     range_per_radian_m,
     range_to_phase_rad,
 )
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import RangingSignal, discriminate, modulate, tone_of
 from rail_signals.ranging.transponder import reply_lag_rad
 
@@ -51,7 +51,7 @@ def range_errors(
     Both ends of the link receive in noise of the same ratio; the transponder answers with the
     phase it understood, a microsecond later, which the station takes off.
     """
-    receiver = LineReceiver(signal)
+    receiver = FmToneReceiver(signal)
 
     def lines(waves: ComplexArray) -> FloatArray:
         return np.asarray(receiver.estimate(waves).phase_lag_rad)
@@ -65,8 +65,8 @@ def range_errors(
         down = receive(_noisy(modulate(signal, np.full((bursts, 1), one_way)), snr, rng))
         reply = np.nan_to_num(reply_lag_rad(down, signal, _DELAY_S)) + one_way
         up = receive(_noisy(modulate(signal, reply), snr, rng))[:, 0]
-        found_m = phase_to_range_m(up, TONE_HZ, delay_s=_DELAY_S)
-        errors.append(found_m - _DISTANCE_M)
+        estimated_m = phase_to_range_m(up, TONE_HZ, delay_s=_DELAY_S)
+        errors.append(estimated_m - _DISTANCE_M)
     return errors[0], errors[1]
 
 
@@ -162,7 +162,7 @@ def _comparators(figure: Figure) -> None:
     axes.set(
         title="An AND gate cannot tell 50 m from 350 m; a quadrature comparator can",
         xlabel="true distance [m]",
-        ylabel="distance told [m]",
+        ylabel="measured distance [m]",
         ylim=(0.0, 480.0),
     )
     axes.legend(loc="upper left")
@@ -272,41 +272,41 @@ def _range_error(figure: Figure) -> None:
     axes.legend()
 
 
-FIGURES: Final[dict[str, Picture]] = {
-    "ranging_fig03_moving_wave": Picture(
+FIGURES: Final[dict[str, FigureSpec]] = {
+    "ranging_fig03_moving_wave": FigureSpec(
         _moving_wave,
         "Fig 3: the tone of 375 kHz at four moments. Its shape moves on with the speed of light, "
         "so that a phase is a distance: one wavelength is 800 m.",
     ),
-    "ranging_fig04_phase_lags": Picture(
+    "ranging_fig04_phase_lags": FigureSpec(
         _fig4,
         "Fig 4: the reference and tones that come back 45° and 315° behind it. The second is as "
         "far ahead as the first is behind.",
     ),
-    "ranging_fig05_and_45": Picture(
+    "ranging_fig05_and_45": FigureSpec(
         lambda figure: _gate(figure, 45.0),
         "Fig 5: reference AND tone, 45° behind: a pulse of 1.000 µs (the document prints 1.04).",
     ),
-    "ranging_fig06_and_315": Picture(
+    "ranging_fig06_and_315": FigureSpec(
         lambda figure: _gate(figure, 315.0),
         "Fig 6: the same, 315° behind: again 1.000 µs. An AND gate cannot tell it from 45°.",
     ),
-    "ranging_comparators": Picture(
+    "ranging_comparators": FigureSpec(
         _comparators,
         "What two comparators tell of distances up to 600 m: the AND gate folds back at 200 m, "
         "the quadrature comparator begins anew at 400 m.",
     ),
-    "ranging_fig07_zones": Picture(
+    "ranging_fig07_zones": FigureSpec(
         _fig7,
         "Fig 7: zones take the channel pairs 1/2 and 3/4 in turn; the train changes channels at "
         "the station where a zone begins.",
     ),
-    "ranging_fig08_branch": Picture(
+    "ranging_fig08_branch": FigureSpec(
         _fig8,
         "Fig 8: a line with a branch. WRS5 has two antennas (arrows) and watches zone 5 on the "
         "main track and zone 7 on the branch; the branch uses channels 5 to 8.",
     ),
-    "ranging_error_over_snr": Picture(
+    "ranging_error_over_snr": FigureSpec(
         _range_error,
         "Error of ranges against the Cramér-Rao bound: the receiver of spectral lines stays on "
         "the bound to -12 dB, the discriminator leaves it below 10 dB.",

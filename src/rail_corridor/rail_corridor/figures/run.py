@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rail_corridor.equipment.registry import subsystems
 from rail_corridor.equipment.run_figures import ErrorPanel, FigureData, RunFigure
-from rail_corridor.plotting import COLOURS, Picture
+from rail_corridor.plotting import COLOURS, FigureSpec
 from rail_corridor.report.from_recording import RecordedRun
 from rail_msgs_py.topics.world import COMMAND, STATE
 from rail_signals.arrays import FloatArray
@@ -23,7 +23,7 @@ _ADDED: Final = tuple(subsystem.run_figures() for subsystem in subsystems())
 def _time_distance(figure: Figure, run: FigureData) -> None:
     figure.set_size_inches(8.5, 4.8)
     axes = figure.subplots()
-    limits = [found for each in _ADDED if (found := each.path_limits(run)) is not None]
+    limits = [errors for each in _ADDED if (errors := each.path_limits(run)) is not None]
     for index, name in enumerate(run.data.trains):
         colour, dashes = COLOURS[index % 7], _DASHES[index // 7 % 4]
         front_m = run.state(index, "path_m")
@@ -136,12 +136,12 @@ FIGURES: Final[dict[str, RunFigure]] = {
 }
 
 
-def pictures_of(run: RecordedRun) -> dict[str, Picture]:
+def figure_specs_of(run: RecordedRun) -> dict[str, FigureSpec]:
     """Figures that a run has something for, by name."""
     data = FigureData(run.scenario, run.intake.recording)
 
-    def picture(one: RunFigure) -> Picture:
-        return Picture(lambda figure: one.draw(figure, data), one.caption)
+    def spec(one: RunFigure) -> FigureSpec:
+        return FigureSpec(lambda figure: one.draw(figure, data), one.caption)
 
     applying = {n: one for n, one in FIGURES.items() if _has_trains(data) and one.applies(data)}
-    return {name: picture(one) for name, one in applying.items()}
+    return {name: spec(one) for name, one in applying.items()}

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.signal import hilbert, sosfilt, square
 
-from rail_corridor.plotting import Picture
+from rail_corridor.plotting import FigureSpec
 from rail_signals.arrays import FloatArray
 from rail_signals.track_code.demodulator import DemodulatorChain
 from rail_signals.track_code.filters import dc_rejecter, post_demodulation_filter, response
@@ -189,51 +189,51 @@ def delay_samples(sent: FloatArray, received: FloatArray, most: int = 800) -> in
     return int(np.argmin(errors))
 
 
-FIGURES: dict[str, Picture] = {
-    "track_code_fig05_three_tones": Picture(
+FIGURES: dict[str, FigureSpec] = {
+    "track_code_fig05_three_tones": FigureSpec(
         _fig5,
         "Fig 5: the spectrum of three tones in a rectangular window of 100 samples. Each lies in "
         "its own bin with |X| = 50; there is nothing elsewhere.",
     ),
-    "track_code_fig06_filtered_square": Picture(
+    "track_code_fig06_filtered_square": FigureSpec(
         lambda figure: _filter(figure, 200.0, squared=True),
         "Fig 6: a square wave of 200 Hz with noise of 8 kHz, before and after the low-pass.",
     ),
-    "track_code_fig07_filtered_sine": Picture(
+    "track_code_fig07_filtered_sine": FigureSpec(
         lambda figure: _filter(figure, 400.0, squared=False),
         "Fig 7: a sine of 400 Hz with noise of 8 kHz, before and after the low-pass.",
     ),
-    "track_code_fig08_sine_spectrum": Picture(
+    "track_code_fig08_sine_spectrum": FigureSpec(
         _fig8,
         "Fig 8: the nearest bin depends on the number of samples: 387.6 Hz with 516, 390.6 Hz "
         "with 512, for 400 Hz.",
     ),
-    "track_code_fig09_board_fft": Picture(
+    "track_code_fig09_board_fft": FigureSpec(
         _fig9, "Fig 9: 300 Hz in 8192 samples of 20 µs: the peak is bin 49, at 299.07 Hz."
     ),
-    "track_code_fig10_square_spectrum": Picture(
+    "track_code_fig10_square_spectrum": FigureSpec(
         _fig10,
         "Fig 10: the spectrum of Fig 6. The fundamental stands out; the low-pass takes the noise "
         "of 8 kHz away.",
     ),
-    "track_code_fig11_filtered_sine": Picture(
+    "track_code_fig11_filtered_sine": FigureSpec(
         _fig11, "Fig 11: the spectrum of Fig 7, before and after the low-pass."
     ),
-    "track_code_fig12_fm_wave": Picture(
+    "track_code_fig12_fm_wave": FigureSpec(
         _fig12,
         "Fig 12: the carrier in the rails and the wave that modulates it: its periods shorten "
         "where the wave is high. The deviation is three times that of the profile, to be seen.",
     ),
-    "track_code_fig13_demodulated": Picture(
+    "track_code_fig13_demodulated": FigureSpec(
         _fig13,
         "Fig 13: the wave synthesised in the transmitter and what the receiver demodulates, set "
         "off by its delay.",
     ),
-    "track_code_dc_rejecter": Picture(
+    "track_code_dc_rejecter": FigureSpec(
         _rejecter,
         "Equation 10, with its gain mended: the DC rejecter leaves all but the lowest tone alone.",
     ),
-    "track_code_message_errors": Picture(
+    "track_code_message_errors": FigureSpec(
         track_code_error_figure.draw,
         "Words of 27 tones that are lost: the bound for one slot of 1.6 s, the maximum-likelihood "
         "fit started near the truth (250 words a point), and the document's chain with its "

@@ -15,7 +15,7 @@ from rail_signals.arrays import FloatArray
 from rail_signals.track_code.bound import best_threshold, on_off_error_probability, tone_sigma_bound
 from rail_signals.track_code.ml import MaximumLikelihoodTones
 from rail_signals.track_code.profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
-from rail_signals.track_code.receiver import FastTrackCodeReceiver
+from rail_signals.track_code.receiver import TrackCodeReceiver
 from rail_signals.track_code.signal import FmTransmitter
 from rail_signals.track_code.word import encode
 
@@ -74,8 +74,8 @@ def _fit_errors(
     slots = np.exp(1j * start @ fit.basis) + noise * math.sqrt(0.5 / snr)
     sigma = tone_sigma_bound(tones, snr, samples, BASEBAND_HZ)
     threshold = sigma * [best_threshold(ratio) for ratio in (deviations / sigma).tolist()]
-    found = np.abs(fit.refine(slots, start).amplitudes_hz) > threshold
-    return float(np.mean((found != sent).any(axis=1)))
+    decided = np.abs(fit.refine(slots, start).amplitudes_hz) > threshold
+    return float(np.mean((decided != sent).any(axis=1)))
 
 
 def chain_losses(
@@ -86,7 +86,7 @@ def chain_losses(
     word = encode(profile, fields)
     wave = FmTransmitter(profile, CARRIER_HZ, RATE_HZ).block(word, round(seconds * RATE_HZ))
     wave += rng.normal(scale=math.sqrt(RATE_HZ / (4 * 10 ** (density_db_hz / 10))), size=wave.size)
-    decisions = FastTrackCodeReceiver(profile, CARRIER_HZ, RATE_HZ).feed(wave)
+    decisions = TrackCodeReceiver(profile, CARRIER_HZ, RATE_HZ).feed(wave)
     per_s = len(decisions) / seconds
     step = math.ceil(profile.slot_samples / SLOT_RATE_HZ * per_s)
     counted = decisions[round(_SETTLED_S * per_s) :: step]
@@ -116,7 +116,7 @@ def draw(figure: Figure) -> None:
     axes.set(
         title="Words of 27 tones that are lost, one slot of 1.6 s",
         xlabel="carrier-to-noise density [dB Hz]",
-        ylabel="share of the words",
+        ylabel="fraction of the words",
         yscale="log",
         ylim=(1e-4, 1.5),
     )

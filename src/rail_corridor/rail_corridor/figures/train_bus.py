@@ -8,9 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from rail_corridor.plotting import COLOURS, Picture
+from rail_corridor.plotting import COLOURS, FigureSpec
 from rail_signals.arrays import FloatArray
+from rail_signals.train_bus.bus_line import BusLine, CableSection, Termination
 from rail_signals.train_bus.cable import Cable
+from rail_signals.train_bus.cable_constants import longest_stub_m, velocity_from_impedance
 from rail_signals.train_bus.consist import Deviations
 from rail_signals.train_bus.faults import (
     BadSplice,
@@ -20,8 +22,6 @@ from rail_signals.train_bus.faults import (
     ShortCircuit,
     WaterIngress,
 )
-from rail_signals.train_bus.line import Line, Section, Termination
-from rail_signals.train_bus.line_constants import longest_stub_m, velocity_from_impedance
 from rail_signals.train_bus.profile import load_bus_profile
 from rail_signals.train_bus.study.campaign import Case
 from rail_signals.train_bus.study.detection_limits import detectable_size
@@ -40,11 +40,13 @@ _SEED: Final = 53
 _PLACES: Final = 4
 
 
-def wave(line: Line, duration_s: float, reference_ohm: float) -> tuple[FloatArray, FloatArray]:
+def wave(
+    bus_line: BusLine, duration_s: float, reference_ohm: float
+) -> tuple[FloatArray, FloatArray]:
     """Time [s] and reflectogram of a step at the head of a line."""
     start_s = -lead_in_s(RISE_S)
     grid = TimeGrid(int((duration_s - start_s) / (RISE_S / 5)), RISE_S / 5, start_s)
-    return grid.time_s, reflected_wave(line, grid, reference_ohm, RISE_S)
+    return grid.time_s, reflected_wave(bus_line, grid, reference_ohm, RISE_S)
 
 
 def _plain_ticks(axes: Any, values: tuple[float, ...]) -> None:
@@ -79,8 +81,8 @@ def _mismatches(figure: Figure) -> None:
     cable = Cable.from_impedance(IMPEDANCE_OHM, 0.66)
     loads = {"open: +1": np.inf, "240 Ω": 240.0, "120 Ω: nothing": 120.0, "60 Ω": 60.0}
     for index, (label, load_ohm) in enumerate({**loads, "short: −1": 0.0}.items()):
-        line = Line((Section(cable, 47.0),), Termination(load_ohm))
-        time_s, reflected = wave(line, 700e-9, IMPEDANCE_OHM)
+        bus_line = BusLine((CableSection(cable, 47.0),), Termination(load_ohm))
+        time_s, reflected = wave(bus_line, 700e-9, IMPEDANCE_OHM)
         dashes = ("-", "--", "-", "-.", "-")[index]
         axes.plot(1e9 * time_s, reflected, dashes, color=COLOURS[index], label=label)
     axes.set(
@@ -117,7 +119,7 @@ def _loads(figure: Figure) -> None:
 def echo_s(length_m: float, factor: float) -> float:
     """Time [s] at which the step from the open end of a cable comes back to half its height."""
     cable = Cable.from_impedance(IMPEDANCE_OHM, factor)
-    time_s, reflected = wave(Line((Section(cable, length_m),)), 900e-9, IMPEDANCE_OHM)
+    time_s, reflected = wave(BusLine((CableSection(cable, length_m),)), 900e-9, IMPEDANCE_OHM)
     return float(np.interp(0.5, reflected, time_s))
 
 
@@ -126,7 +128,9 @@ def _cars(figure: Figure) -> None:
     for axes, (label, factor) in zip(rows, FACTORS.items(), strict=True):
         cable = Cable.from_impedance(IMPEDANCE_OHM, factor)
         for length_m, colour, dashes in ((27.0, COLOURS[1], "--"), (47.0, COLOURS[0], "-")):
-            time_s, reflected = wave(Line((Section(cable, length_m),)), 900e-9, IMPEDANCE_OHM)
+            time_s, reflected = wave(
+                BusLine((CableSection(cable, length_m),)), 900e-9, IMPEDANCE_OHM
+            )
             when_ns = 1e9 * echo_s(length_m, factor)
             axes.plot(1e9 * time_s, reflected, dashes, color=colour, label=f"{length_m:.0f} m")
             axes.annotate(
@@ -141,7 +145,7 @@ def _cars(figure: Figure) -> None:
 def _reflectograms(figure: Figure) -> None:
     figure.set_size_inches(8.0, 6.0)
     consist = train_consist(CARS)
-    healthy, cable = consist.line(), consist.runs[0].cable
+    healthy, cable = consist.bus_line(), consist.runs[0].cable
     duration_s = 2.0 * 140.0 / cable.velocity_m_per_s
     time_s, sound = wave(healthy, duration_s, cable.impedance_ohm)
     place_m = 0.5 * time_s * cable.velocity_m_per_s
@@ -149,8 +153,8 @@ def _reflectograms(figure: Figure) -> None:
     above.plot(place_m, sound, color="black", label="healthy")
     gross: dict[str, BusFault] = {"cut at 80 m": OpenCircuit(80.0), "short": ShortCircuit(80.0)}
     for (label, fault), colour, dashes in zip(gross.items(), COLOURS, ("--", "-."), strict=False):
-        _, found = wave(fault.apply(healthy), duration_s, cable.impedance_ohm)
-        above.plot(place_m, found, dashes, color=colour, label=label)
+        _, reflected = wave(fault.apply(healthy), duration_s, cable.impedance_ohm)
+        above.plot(place_m, reflected, dashes, color=colour, label=label)
     slight: dict[str, BusFault] = {
         "5 m wet at 20 m: 10 % more capacitance": WaterIngress(20.0, 5.0, 0.1),
         "splice of 5 Ω at 60 m": BadSplice(60.0, 5.0),
@@ -159,8 +163,8 @@ def _reflectograms(figure: Figure) -> None:
     for (label, fault), colour, dashes in zip(
         slight.items(), COLOURS, ("-", "--", "-."), strict=False
     ):
-        _, found = wave(fault.apply(healthy), duration_s, cable.impedance_ohm)
-        below.plot(place_m, 100.0 * (found - sound), dashes, color=colour, label=label)
+        _, reflected = wave(fault.apply(healthy), duration_s, cable.impedance_ohm)
+        below.plot(place_m, 100.0 * (reflected - sound), dashes, color=colour, label=label)
     for axes in (above, below):
         for border_m in consist.starts_m[1:]:
             axes.axvline(border_m, color="black", ls=":", lw=0.8)
@@ -231,37 +235,37 @@ def smallest_ohm(kind: str, level_db: float, place: int) -> float:
     return detectable_size(case, np.random.default_rng([_SEED, place]), 0.5)
 
 
-FIGURES: Final[dict[str, Picture]] = {
-    "train_bus_fig02_stub": Picture(
+FIGURES: Final[dict[str, FigureSpec]] = {
+    "train_bus_fig02_stub": FigureSpec(
         _stub,
         "Fig 2 and equation 22: the longest stub over the transition time. 13 ns allow 166.7 mm; "
         "the 1 m that is usual needs 78 ns.",
     ),
-    "train_bus_fig03_mismatches": Picture(
+    "train_bus_fig03_mismatches": FigureSpec(
         _mismatches,
         "Fig 3: what a wrong impedance at the end of the cable sends back: up if it is too high, "
         "down if it is too low, nothing if it fits.",
     ),
-    "train_bus_fig05_pulses": Picture(
+    "train_bus_fig05_pulses": FigureSpec(
         _loads,
         "Figs 4 and 5: pulses of a good transmitter on the test loads. On the heavy load it has "
         "to keep 3 V; on the idle load a capacitor rounds the pulse.",
     ),
-    "train_bus_fig06_echoes": Picture(
+    "train_bus_fig06_echoes": FigureSpec(
         _cars,
         "Fig 6: steps from the open ends of 47 m and 27 m of cable: 475.1 and 272.9 ns in "
         "polyethylene, 733.2 and 421.2 ns in the cable of the document's example.",
     ),
-    "train_bus_reflectograms": Picture(
+    "train_bus_reflectograms": FigureSpec(
         _reflectograms,
         "Reflectograms of a healthy and of faulty trains. A cut and a short are seen at once; "
         "slight faults stand out where the trace of the healthy train is taken off.",
     ),
-    "train_bus_attenuation": Picture(
+    "train_bus_attenuation": FigureSpec(
         _attenuation,
         "Attenuation over frequency of two cable profiles, with the most that IEC 61375 allows.",
     ),
-    "train_bus_limits": Picture(
+    "train_bus_limits": FigureSpec(
         _limits,
         "Limits of detection: resistances that have an even chance to be found, median and range "
         "over places. The document's 15 dB would let 970 Ω pass.",

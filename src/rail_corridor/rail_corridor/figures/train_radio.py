@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from rail_corridor.plotting import COLOURS, Picture
+from rail_corridor.plotting import COLOURS, FigureSpec
 from rail_signals.train_radio.ber.closed_form import SCHEMES, error_rate
 from rail_signals.train_radio.ber.link import DiversityLink
 from rail_signals.train_radio.ber.monte_carlo import Result, until
@@ -39,9 +39,9 @@ def _error_rates(figure: Figure) -> None:
         label, marker, dashes = LABELS[name]
         axes.plot(fine_db, error_rate(scheme, 10.0 ** (fine_db / 10.0), 1), dashes, color=colour)
         there = error_rate(scheme, 10.0 ** (_LEVELS_DB / 10.0), 1) >= _LEAST_RATE
-        found = [counted(scheme, level) for level in _LEVELS_DB[there].tolist()]
-        rates = np.array([each.rate for each in found])
-        bars = np.abs(np.array([each.interval for each in found]).T - rates)
+        counts = [counted(scheme, level) for level in _LEVELS_DB[there].tolist()]
+        rates = np.array([each.rate for each in counts])
+        bars = np.abs(np.array([each.interval for each in counts]).T - rates)
         axes.errorbar(
             _LEVELS_DB[there],
             rates,
@@ -107,18 +107,18 @@ def _brakings(figure: Figure) -> None:
     axes.legend()
 
 
-FIGURES: Final[dict[str, Picture]] = {
-    "train_radio_fig03_error_rates": Picture(
+FIGURES: Final[dict[str, FigureSpec]] = {
+    "train_radio_fig03_error_rates": FigureSpec(
         _error_rates,
         "Fig 3 and two more schemes: bit error rates in Rayleigh fading. Two antennas at either "
         "end fall with the fourth power of the signal; the counts (95 % intervals) lie on the "
         "closed forms. Nothing is counted below 3e-6.",
     ),
-    "train_radio_gain": Picture(
+    "train_radio_gain": FigureSpec(
         _gain,
         "What Alamouti 2x2 gains on MRC 1x2: 4 dB at 1e-3, 8 dB at 1e-5, and ever more.",
     ),
-    "train_radio_brakings": Picture(
+    "train_radio_brakings": FigureSpec(
         _brakings,
         "What the link margin means to a train: brakings an hour because no authority came in "
         "time, by theory. 'rail sweep link_margin' sets runs of the corridor beside it.",

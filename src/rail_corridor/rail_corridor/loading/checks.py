@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rail_corridor.equipment.registry import subsystems
 from rail_corridor.errors import InputError, from_world
-from rail_corridor.scenario.faults import TrainStop, WheelSlip
+from rail_corridor.scenario.faults import TrainStopFault, WheelSlipFault
 from rail_corridor.scenario.model import Scenario
 from rail_corridor.scenario.timetable import CLEARING_TIME_S
 from rail_world.errors import WorldDataError
@@ -38,10 +38,13 @@ def check_scenario(scenario: Scenario, train_fields: Sequence[str]) -> None:
         try:
             TrainMotion(train, network, scenario.tick_s)
         except WorldDataError as error:
-            found = from_world(error)
-            place = found.field.removeprefix(f"trains.{train.name}.")
+            input_error = from_world(error)
+            place = input_error.field.removeprefix(f"trains.{train.name}.")
             raise InputError(
-                found.reason, field=f"{field}.{place}", value=found.value, file=found.file
+                input_error.reason,
+                field=f"{field}.{place}",
+                value=input_error.value,
+                file=input_error.file,
             ) from None
     _check_places_of_trains(scenario.trains, train_fields)
     _check_faults(scenario)
@@ -82,7 +85,7 @@ def _extent(train: TrainDescription) -> tuple[float, float]:
 def _check_faults(scenario: Scenario) -> None:
     trains = [train.name for train in scenario.trains]
     for index, fault in enumerate(scenario.faults):
-        if isinstance(fault, TrainStop | WheelSlip) and fault.train not in trains:
+        if isinstance(fault, TrainStopFault | WheelSlipFault) and fault.train not in trains:
             raise InputError(
                 f"there is no such train, they are {', '.join(trains)}",
                 field=f"faults.{index}.train",

@@ -118,7 +118,7 @@ def turned_round(
     InputError
         For a train that runs over more than one track, or turns back by itself.
     """
-    found = []
+    reversed_trains = []
     for train in trains:
         if len(train.route) > 1 or train.reverse_at:
             raise InputError(
@@ -129,8 +129,8 @@ def turned_round(
             )
         length_m = network.tracks[train.route[0]].length_m
         turned = {"direction": -train.direction, "start_m": length_m - train.start_m}
-        found.append(train.model_copy(update=turned))
-    return tuple(found)
+        reversed_trains.append(train.model_copy(update=turned))
+    return tuple(reversed_trains)
 
 
 def blame_override(

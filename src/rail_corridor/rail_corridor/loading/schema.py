@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 from pydantic import BaseModel, Field, create_model
 
 from rail_corridor.equipment.registry import subsystems
-from rail_corridor.scenario.faults import TrainStop, WheelSlip
+from rail_corridor.scenario.faults import TrainStopFault, WheelSlipFault
 from rail_corridor.scenario.model import Scenario
 
 
@@ -25,7 +25,7 @@ def scenario_model() -> type[Scenario]:
         for subsystem in subsystems()
         for section in subsystem.sections
     }
-    faults = (TrainStop, WheelSlip, *(f for each in subsystems() for f in each.faults))
+    faults = (TrainStopFault, WheelSlipFault, *(f for each in subsystems() for f in each.faults))
     fault: Any = Annotated[reduce(or_, faults), Field(discriminator="kind")]
     common = Scenario.model_fields["faults"]
     sections["faults"] = (

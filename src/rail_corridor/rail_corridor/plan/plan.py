@@ -107,11 +107,11 @@ def make_plan(
     observed: bool = True,
     timeout_s: float = 30.0,
     external: Iterable[str] = (),
-    bystanders: Iterable[str] = (),
+    observers: Iterable[str] = (),
 ) -> Plan:
     """Plan a run; writes the world file into ``run_directory``.
 
-    The world waits for the nodes of the plan, and for ``bystanders``, which are not in it.
+    The world waits for the nodes of the plan, and for ``observers``, which are not in it.
     """
     world = world_file(scenario)
     world_path = run_directory / "world.json"
@@ -126,7 +126,7 @@ def make_plan(
         "world_file": str(world_path),
         "ticks": scenario.ticks,
         "rate": float(rate),
-        "nodes": (*(spec.name for spec in nodes), *bystanders),
+        "nodes": (*(spec.name for spec in nodes), *observers),
         "sinks": tuple(spec.name for spec in nodes if kinds[spec.kind].sink),
         "clock_readers": len(clocked - {*external}),
         "supervised": trains if supervision else (),

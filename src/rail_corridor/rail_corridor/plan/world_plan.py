@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rail_corridor.equipment.registry import odometer_error_of, subsystems
-from rail_corridor.scenario.faults import TrainStop as TrainStopFault
-from rail_corridor.scenario.faults import WheelSlip as WheelSlipFault
+from rail_corridor.scenario.faults import TrainStopFault as TrainStopFault
+from rail_corridor.scenario.faults import WheelSlipFault as WheelSlipFault
 from rail_corridor.scenario.model import Scenario
 from rail_world.line.drawing import Drawing
 from rail_world.trains.description import TrainStop, WheelSlip

@@ -141,10 +141,10 @@ class RecordingFile:
             self.first_ns = min(self.first_ns, log_time_ns) if self._count else log_time_ns
             self.last_ns = max(self.last_ns, log_time_ns)
             self._count += 1
-            found = chosen[number]
-            if found is None:
+            known = chosen[number]
+            if known is None:
                 continue
-            yield RecordedMessage(found, log_time_ns, bytes(body[_MESSAGE.size :]))
+            yield RecordedMessage(known, log_time_ns, bytes(body[_MESSAGE.size :]))
 
     def _advance(self) -> tuple[int, int, bytes] | None:
         """Read up to the next record that holds messages; None at the end."""
@@ -253,7 +253,7 @@ def _opened(path: Path) -> tuple[BinaryIO, int, bool]:
         size = path.stat().st_size
         magic = stream.read(len(MCAP0_MAGIC))
         stream.seek(max(size - len(MCAP0_MAGIC), 0))
-        whole = size >= 2 * len(MCAP0_MAGIC) and stream.read() == MCAP0_MAGIC
+        complete = size >= 2 * len(MCAP0_MAGIC) and stream.read() == MCAP0_MAGIC
         stream.seek(len(MCAP0_MAGIC))
     except OSError as error:
         raise InputError(error.strerror or "cannot be read", file=name) from None
@@ -263,7 +263,7 @@ def _opened(path: Path) -> tuple[BinaryIO, int, bool]:
         raise InputError("is empty", file=name)
     if magic != MCAP0_MAGIC:
         raise InputError("is not an MCAP file", file=name)
-    return stream, size, whole
+    return stream, size, complete
 
 
 def _parsed(read: Callable[[Any], Any], stream: ReadDataStream) -> Any:

@@ -127,9 +127,9 @@ class McapRecorder:
             self._schemas[info.type],
             {"offered_qos_profiles": info.offered_qos_profiles},
         )
-        made = _Channel(number, stamp_reader(message_class(info.type)))
-        self._topics[info.topic, info.type] = made
-        return made
+        created = _Channel(number, stamp_reader(message_class(info.type)))
+        self._topics[info.topic, info.type] = created
+        return created
 
     def _message(self, source: Source, channel: _Channel, raw: Raw) -> None:
         # What carries no time, or zero for "not set", belongs to the tick of its process.

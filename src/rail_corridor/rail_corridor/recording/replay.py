@@ -119,7 +119,7 @@ def replay(path: Path, options: ReplayOptions, console: Console) -> int:
             pass
         try:
             offers = offers_of(file.channels, options.topics)
-            begin_ns, end_ns = span_of(file, options)
+            start_ns, end_ns = span_of(file, options)
         except InputError as error:
             raise error.located("" if error.field.startswith("--") else str(path)) from None
         if file.cut_at is not None:
@@ -130,9 +130,9 @@ def replay(path: Path, options: ReplayOptions, console: Console) -> int:
             )
     discover_on("this")
     with sole_corridor(), _until_stopped() as stop, RecordingFile(path) as file:
-        messages = ordered(file, offers, begin_ns, end_ns)
+        messages = ordered(file, offers, start_ns, end_ns)
         with _publishers(offers, stop) as publish:
-            _publish_paced(messages, publish, options.rate, (begin_ns, end_ns), stop, console)
+            _publish_paced(messages, publish, options.rate, (start_ns, end_ns), stop, console)
     return 128 + stop.number if stop.number else 0
 
 
@@ -177,17 +177,17 @@ def _offer_of(channel: RecordedChannel) -> Offer:
 
 def span_of(file: RecordingFile, options: ReplayOptions) -> tuple[int, int]:
     """First and last instant [ns] to publish, of a file that has been read."""
-    begin_ns = max(round(options.start_s * 1e9), file.first_ns)
-    if begin_ns > file.last_ns:
+    start_ns = max(round(options.start_s * 1e9), file.first_ns)
+    if start_ns > file.last_ns:
         reason = f"the recording ends at {file.last_ns * 1e-9:g} s"
         raise InputError(reason, field="--start", value=options.start_s)
     if options.duration_s is None:
-        return begin_ns, file.last_ns
-    return begin_ns, min(begin_ns + round(options.duration_s * 1e9), file.last_ns)
+        return start_ns, file.last_ns
+    return start_ns, min(start_ns + round(options.duration_s * 1e9), file.last_ns)
 
 
 def ordered(
-    file: RecordingFile, offers: Mapping[str, Offer], begin_ns: int, end_ns: int
+    file: RecordingFile, offers: Mapping[str, Offer], start_ns: int, end_ns: int
 ) -> Iterator[RecordedMessage]:
     """Yield what is to be published, in the order of time; at each instant what is latched first.
 
@@ -201,7 +201,7 @@ def ordered(
     for chunk in file.chunks(lambda channel: channel.topic in offers):
         now = []
         for message in chunk:
-            if message.log_time_ns >= begin_ns:
+            if message.log_time_ns >= start_ns:
                 now.append(message)
             elif offers[message.channel.topic].latched:
                 before[message.channel.topic].append(message)
@@ -222,16 +222,16 @@ def _publish_paced(
     console: Console,
 ) -> None:
     """Publish each message when it is due."""
-    begin_ns, end_ns = span_ns
+    start_ns, end_ns = span_ns
     columns = TextColumn("replaying"), BarColumn(bar_width=None), TextColumn(_PROGRESS)
     with Progress(*columns, console=console, transient=True) as progress:
-        bar = progress.add_task("", total=(end_ns - begin_ns) * 1e-9)
+        bar = progress.add_task("", total=(end_ns - start_ns) * 1e-9)
         begun_s = time.monotonic()
-        now_ns = begin_ns
+        now_ns = start_ns
         for message in messages:
             if message.log_time_ns > now_ns:
                 now_ns = message.log_time_ns
-                elapsed_s = (now_ns - begin_ns) * 1e-9
+                elapsed_s = (now_ns - start_ns) * 1e-9
                 progress.update(bar, completed=elapsed_s)
                 if stop.within(begun_s + elapsed_s / rate - time.monotonic()):
                     return
@@ -258,16 +258,16 @@ def _publishers(
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Node("rail_replay", start_parameter_services=False, enable_rosout=False)
     try:
-        made = {
+        created = {
             name: node.create_publisher(offer.kind, name, offer.profile)
             for name, offer in offers.items()
         }
-        raw = {name: publisher.handle.publish_raw for name, publisher in made.items()}
-        _wait_for_subscribers(made.values(), stop)
+        raw = {name: publisher.handle.publish_raw for name, publisher in created.items()}
+        _wait_for_subscribers(created.values(), stop)
         yield lambda message: raw[message.channel.topic](message.data)
         if not stop.number:
             deadline_s = time.monotonic() + _ACKNOWLEDGE_S
-            for publisher in made.values():
+            for publisher in created.values():
                 left_s = max(deadline_s - time.monotonic(), 0.0)
                 publisher.wait_for_all_acked(Duration(seconds=left_s))
     finally:
@@ -278,13 +278,13 @@ def _publishers(
 def _wait_for_subscribers(publishers: Iterable[Any], stop: _Stop) -> None:
     """Wait until those that are there have been found."""
     publishers = list(publishers)
-    found, since_s = 0, time.monotonic()
+    subscribers, since_s = 0, time.monotonic()
     deadline_s = since_s + DISCOVERY_S
     while (now_s := time.monotonic()) < deadline_s:
-        if now_s - since_s > (SETTLED_S if found else LONELY_S):
+        if now_s - since_s > (SETTLED_S if subscribers else LONELY_S):
             return
         count = sum(publisher.get_subscription_count() for publisher in publishers)
-        if count != found:
-            found, since_s = count, now_s
+        if count != subscribers:
+            subscribers, since_s = count, now_s
         if stop.within(_POLL_S):
             return

@@ -15,7 +15,7 @@ END: Final = "rail_corridor.end"
 
 
 @dataclass(frozen=True)
-class Beginning:
+class RunStart:
     """Known before the first tick; a recording cut short has it."""
 
     scenario: str
@@ -28,14 +28,14 @@ class Beginning:
         return {key: str(value) for key, value in vars(self).items()}
 
     @classmethod
-    def of(cls, values: Mapping[str, str]) -> Beginning:
+    def of(cls, values: Mapping[str, str]) -> RunStart:
         """Inverse of `values`; raises InputError."""
         numbers = {key: _count(values, key, BEGIN) for key in ("seed", "nodes", "processes")}
         return cls(values.get("scenario", ""), **numbers)
 
 
 @dataclass(frozen=True)
-class Ending:
+class RunEnd:
     """Known when the run has ended: whether at its own end, after how many ticks and how long.
 
     The wall time is what no message tells; None if no tick was heard.
@@ -51,7 +51,7 @@ class Ending:
         return {"complete": str(self.complete).lower(), "ticks": str(self.ticks), **wall}
 
     @classmethod
-    def of(cls, values: Mapping[str, str]) -> Ending:
+    def of(cls, values: Mapping[str, str]) -> RunEnd:
         """Inverse of `values`; raises InputError."""
         if values.get("complete") not in ("true", "false"):
             raise InputError(

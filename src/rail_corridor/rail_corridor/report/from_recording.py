@@ -21,7 +21,7 @@ from rail_corridor.errors import InputError
 from rail_corridor.loading.scenario_files import scenario_from
 from rail_corridor.plan.plan import Plan, make_plan
 from rail_corridor.recording.mcap_file import RecordedChannel, RecordedMessage, RecordingFile
-from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
+from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.message_definition import type_name
 
@@ -53,13 +53,13 @@ def show_report(path: Path, json_path: Path | None, console: Console) -> int:
 
 
 class RecordedRun(NamedTuple):
-    """A run as its recording tells it; ``ending`` is None if that was cut short."""
+    """A run as its recording tells it; ``run_end`` is None if that was cut short."""
 
     scenario: Scenario
     plan: Plan
     intake: Intake
-    beginning: Beginning
-    ending: Ending | None
+    run_start: RunStart
+    run_end: RunEnd | None
 
 
 def report_of(file: RecordingFile) -> dict[str, Any]:
@@ -71,16 +71,16 @@ def report_of(file: RecordingFile) -> dict[str, Any]:
         If it is damaged, or not a recording of a corridor.
     """
     run = run_of(file)
-    ending, intake = run.ending, run.intake
-    wall_s = math.nan if ending is None or ending.wall_time_s is None else ending.wall_time_s
+    run_end, intake = run.run_end, run.intake
+    wall_s = math.nan if run_end is None or run_end.wall_time_s is None else run_end.wall_time_s
     intake.first_tick_s, intake.last_tick_s = 0.0, wall_s
     return make_report(
         run.scenario,
         run.plan,
         intake,
-        nodes=run.beginning.nodes,
-        processes=run.beginning.processes,
-        interrupted=ending is None or not ending.complete,
+        nodes=run.run_start.nodes,
+        processes=run.run_start.processes,
+        interrupted=run_end is None or not run_end.complete,
     )
 
 
@@ -90,23 +90,23 @@ def run_of(file: RecordingFile) -> RecordedRun:
     with tempfile.TemporaryDirectory(prefix="rail_corridor_") as directory:
         try:
             scenario = scenario_from(file.attachments, Path(directory))
-            beginning = Beginning.of(file.metadata.get(BEGIN, {}))
+            run_start = RunStart.of(file.metadata.get(BEGIN, {}))
             plan = make_plan(scenario, Path(directory))
             intake = Intake(plan)
             _feed(file, intake)
-            ending = Ending.of(file.metadata[END]) if END in file.metadata else None
+            run_end = RunEnd.of(file.metadata[END]) if END in file.metadata else None
         except InputError as error:
             raise error.located(name) from None
     recording = intake.recording
-    if ending is None:
+    if run_end is None:
         recording.end_at(max(recording.ticks - 1, 0))
-    elif not ending.complete:
-        recording.end_at(ending.ticks)
-    return RecordedRun(scenario, plan, intake, beginning, ending)
+    elif not run_end.complete:
+        recording.end_at(run_end.ticks)
+    return RecordedRun(scenario, plan, intake, run_start, run_end)
 
 
 def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any] | None) -> list[str]:
-    """Names of the figures in which two reports differ; none where there is but one report.
+    """Names of the values in which two reports differ; none where there is but one report.
 
     >>> differences({"ticks": 3, "trains": {"a": {"max_m": 0.5}}}, {"ticks": 3, "trains": {}})
     ['trains']
@@ -115,14 +115,14 @@ def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any] | None) -> li
     """
     if theirs is None:
         return []
-    found = []
+    report = []
     for key in sorted({*ours, *theirs}):
         one, other = ours.get(key), theirs.get(key)
         if isinstance(one, Mapping) and isinstance(other, Mapping) and {*one} == {*other}:
-            found += [f"{key}.{name}" for name in differences(one, other)]
+            report += [f"{key}.{name}" for name in differences(one, other)]
         elif one != other:
-            found.append(key)
-    return found
+            report.append(key)
+    return report
 
 
 def _reported(file: RecordingFile) -> dict[str, Any] | None:
@@ -130,10 +130,10 @@ def _reported(file: RecordingFile) -> dict[str, Any] | None:
     for attachment in file.attachments:
         if attachment.name == REPORT:
             try:
-                found = json.loads(attachment.data)
+                report = json.loads(attachment.data)
             except ValueError:
                 return None
-            return found if isinstance(found, dict) else None
+            return report if isinstance(report, dict) else None
     return None
 
 

@@ -86,10 +86,10 @@ class Intake:
     @property
     def failures(self) -> list[dict[str, Any]]:
         """Nodes that failed, each as it was first noticed, in the order of that time."""
-        found = sorted((seen, node) for node, seen in self._failures.items())
+        failures = sorted((seen, node) for node, seen in self._failures.items())
         return [
             {"node": node, "reason": reason, "detected_by": by, "time_s": time_s}
-            for (time_s, by, reason), node in found
+            for (time_s, by, reason), node in failures
         ]
 
     @property

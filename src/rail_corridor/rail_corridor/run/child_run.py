@@ -60,15 +60,15 @@ def report_of(
         if done.returncode or not report.is_file():
             last = (done.stderr.strip() or done.stdout.strip()).splitlines()[-1:]
             raise RunFailedError(f"{label}: exit code {done.returncode}: {' '.join(last)}")
-        found: dict[str, Any] = json.loads(report.read_text())
-        return found
+        content: dict[str, Any] = json.loads(report.read_text())
+        return content
 
 
 def faultless_report_of(
     data: Mapping[str, Any], label: str, *, timeout_s: float, domain: int | None = None
 ) -> dict[str, Any]:
     """As `report_of`; a node that failed on the way counts as no report."""
-    found = report_of(data, label, timeout_s=timeout_s, domain=domain)
-    for failed in found["failures"]:
+    content = report_of(data, label, timeout_s=timeout_s, domain=domain)
+    for failed in content["failures"]:
         raise RunFailedError(f"{label}: {failed['node']}: {failed['reason']}")
-    return found
+    return content

@@ -86,7 +86,7 @@ def check_kills(
         raise InputError(reason, field=_OPTION, value=kill.node)
 
 
-class Executioner:
+class FaultInjector:
     """Kills what is due.
 
     Parameters

@@ -22,14 +22,14 @@ from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.middleware.domain import sole_corridor
 from rail_corridor.plan.plan import REPORT, WORLD, Placement, Plan, check_external, make_plan
 from rail_corridor.recording.frames import Attachment
-from rail_corridor.recording.run_facts import BEGIN, END, Beginning, Ending
+from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
 from rail_corridor.report.report import make_report, print_report, report_text, write_report
 from rail_corridor.scenario.model import Scenario
 
-from .bystander import FULL_NAME as BYSTANDER
-from .bystander import Bystander
+from .external_traffic import FULL_NAME as EXTERNAL_TRAFFIC
+from .external_traffic import ExternalTrafficRecorder
 from .host import make_context, make_nodes, run_nodes
-from .kills import Executioner, Kill, check_kills
+from .kills import FaultInjector, Kill, check_kills
 from .processes import ProcessGroup, remove_orphaned_segments
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class RunOptions:
     switches: bool = False
 
     @property
-    def with_strangers(self) -> bool:
+    def with_external_nodes(self) -> bool:
         """Whether somebody else runs some of the nodes."""
         return bool(self.external or self.only)
 
@@ -79,18 +79,20 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
     discover_on("all" if options.only else "this")
     directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
     try:
-        strangers = (BYSTANDER,) if options.record and options.with_strangers else ()
+        external_nodes = (
+            (EXTERNAL_TRAFFIC,) if options.record and options.with_external_nodes else ()
+        )
         plan = make_plan(
             scenario,
             directory,
             rate=options.rate,
             timeout_s=options.timeout_s,
             external=options.external,
-            bystanders=(REPORT, *strangers),
+            observers=(REPORT, *external_nodes),
         )
         check_external(plan, options.external)
         with sole_corridor(options.only):
-            return _Run(scenario, options, plan, console).run()
+            return _LaunchedRun(scenario, options, plan, console).run()
     finally:
         shutil.rmtree(directory, ignore_errors=True)
 
@@ -112,7 +114,7 @@ def default_placement(plan: Plan, cores: int | None = None) -> Placement:
     return "site" if len({spec.site for spec in plan.nodes}) <= most else "one"
 
 
-class _Run:
+class _LaunchedRun:
     """One run, from the first process to the report."""
 
     def __init__(
@@ -181,13 +183,13 @@ class _Run:
         from .run_recording import RunRecording
 
         plan = self._plan
-        beginning = Beginning(plan.scenario, plan.seed, nodes, len(self._groups))
+        run_start = RunStart(plan.scenario, plan.seed, nodes, len(self._groups))
         return RunRecording(
             path,
             () if self._here else self._groups,
             files_of(self._scenario),
-            {BEGIN: beginning.values()},
-            strangers=self._options.with_strangers,
+            {BEGIN: run_start.values()},
+            external_nodes=self._options.with_external_nodes,
         )
 
     def _on_signal(self, number: int, frame: Any) -> None:
@@ -217,12 +219,12 @@ class _Run:
         )
         here = make_nodes(self._here, context, switches=self._options.switches)
         nodes = [self._observer, *here]
-        if tap is not None and self._options.with_strangers:
+        if tap is not None and self._options.with_external_nodes:
             ours = {spec.name for specs in self._groups.values() for spec in specs}
             others = [spec.name for spec in self._plan.nodes if spec.name not in ours]
             from .run_recording import SHARED
 
-            nodes.append(Bystander(others, tap.open, SHARED, context=context))
+            nodes.append(ExternalTrafficRecorder(others, tap.open, SHARED, context=context))
         executor = EventsExecutor(context=context)
         for node in nodes:
             executor.add_node(node)
@@ -251,7 +253,7 @@ class _Run:
         observer, kills = self._observer, self._options.kills
         if not kills:
             return
-        from rail_msgs_py.table import figures_from_cdr
+        from rail_msgs_py.table import values_from_cdr
         from rail_msgs_py.topics.world import STATE
 
         process = {spec.name: name for name, specs in self._groups.items() for spec in specs}
@@ -265,9 +267,9 @@ class _Run:
             executor.remove_node(here[name])
             observer.announce_failure(name, "killed")
 
-        executioner = Executioner(kills, kill)
+        injector = FaultInjector(kills, kill)
         shape = len(self._scenario.trains), len(STATE.columns)
-        observer.stream_in(STATE, lambda raw: executioner.tick(figures_from_cdr(raw, *shape)[0]))
+        observer.stream_in(STATE, lambda raw: injector.tick(values_from_cdr(raw, *shape)[0]))
 
     def _drain(self, executor: Any) -> None:
         """Read what was sent before the end; of a run that was stopped, its last whole tick."""
@@ -334,9 +336,9 @@ class _Run:
             interrupted=bool(self._signal) or self._world_failed,
         )
         if self._recording is not None and not self._recording_failed:
-            ending = Ending(report["complete"], report["ticks"], report["wall_time_s"])
+            run_end = RunEnd(report["complete"], report["ticks"], report["wall_time_s"])
             file = Attachment("report.json", "application/json", report_text(report).encode())
-            self._recording.tell([file], {END: ending.values()})
+            self._recording.tell([file], {END: run_end.values()})
         return report
 
     def _end_recording(self) -> None:

@@ -46,9 +46,9 @@ class RunRecording:
         Names of the processes of the run, beside the launcher's.
     attachments, metadata
         What stands at the beginning of the file.
-    strangers : bool
+    external_nodes : bool
         Whether nodes take part that somebody else runs: then what is on topics that they share
-        with ours is heard from them, see `bystander`.
+        with ours is heard from them, see `rail_corridor.run.external_traffic`.
 
     Raises
     ------
@@ -63,7 +63,7 @@ class RunRecording:
         attachments: Iterable[Attachment],
         metadata: Mapping[str, Mapping[str, str]],
         *,
-        strangers: bool = False,
+        external_nodes: bool = False,
     ) -> None:
         self.path = path
         try:
@@ -75,7 +75,7 @@ class RunRecording:
         except OSError as error:
             reason = error.strerror or "cannot be written"
             raise InputError(reason, field="--record", value=str(path)) from None
-        self._besides = frozenset(topic.name() for topic in SHARED if strangers)
+        self._besides = frozenset(topic.name() for topic in SHARED if external_nodes)
         ends = {name: os.pipe() for name in (LAUNCHER, *processes)}
         self._reads = [read for read, _ in ends.values()]
         self._writes = {name: write for name, (_, write) in ends.items()}

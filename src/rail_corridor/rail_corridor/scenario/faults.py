@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END, SLIP_RATIO
-from rail_world.line.description_base import Description, Name, Number, field_of
+from rail_world.line.description_base import Description, Name, StrictFloat, field_of
 
 
 class Fault(Description):
@@ -25,8 +25,8 @@ class Fault(Description):
 class TimedFault(Fault):
     """A fault that lasts from one time to another."""
 
-    from_s: Number = field_of(FAULT_BEGIN)
-    to_s: Number = field_of(FAULT_END)
+    from_s: StrictFloat = field_of(FAULT_BEGIN)
+    to_s: StrictFloat = field_of(FAULT_END)
 
     @model_validator(mode="after")
     def _has_a_duration(self) -> TimedFault:
@@ -35,16 +35,16 @@ class TimedFault(Fault):
         return self
 
 
-class TrainStop(TimedFault):
+class TrainStopFault(TimedFault):
     """A train that brakes to a stand as fast as it can and stays there."""
 
     kind: Literal["train_stop"]
     train: Name = Field(description="the train")
 
 
-class WheelSlip(TimedFault):
+class WheelSlipFault(TimedFault):
     """Wheels that turn faster or slower than the train runs."""
 
     kind: Literal["wheel_slip"]
     train: Name = Field(description="the train")
-    ratio: Number = field_of(SLIP_RATIO)
+    ratio: StrictFloat = field_of(SLIP_RATIO)

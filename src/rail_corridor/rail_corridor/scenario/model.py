@@ -13,12 +13,12 @@ from typing_extensions import Self
 
 from rail_msgs_py.quantities import SEED, TICK
 from rail_world.line.description import JunctionDescription, TrackDescription
-from rail_world.line.description_base import Description, Name, Number, field_of
+from rail_world.line.description_base import Description, Name, StrictFloat, field_of
 from rail_world.line.network import Network, build_network
 from rail_world.trains.description import TrainDescription
 
 from .faults import Fault
-from .section_fields import Whole
+from .section_fields import StrictInt
 from .timetable import Timetable
 
 Plan = TypeVar("Plan")
@@ -35,12 +35,12 @@ class Scenario(Description):
 
     name: Name = Field(description="name of the scenario")
     description: str = Field(default="", max_length=1000, description="one line about it")
-    seed: Whole = field_of(SEED)
-    duration_s: Number = Field(gt=0.0, le=1e5, description="simulated time [s]")
+    seed: StrictInt = field_of(SEED)
+    duration_s: StrictFloat = Field(gt=0.0, le=1e5, description="simulated time [s]")
     end_when_arrived: bool = Field(
         default=False, description="end earlier, when every train has arrived"
     )
-    tick_s: Number = field_of(TICK)
+    tick_s: StrictFloat = field_of(TICK)
     tracks: dict[Name, TrackDescription] = Field(max_length=100, description="tracks by name")
     junctions: tuple[JunctionDescription, ...] = Field(
         default=(), max_length=100, description="facing points that join the tracks"

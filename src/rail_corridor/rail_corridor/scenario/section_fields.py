@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field
 
 from rail_msgs_py.ranging.quantities import CHANNEL
-from rail_world.line.description_base import Number, range_of
+from rail_world.line.description_base import StrictFloat, range_of
 
 
 def _not_a_bool(value: object) -> object:
@@ -16,8 +16,8 @@ def _not_a_bool(value: object) -> object:
     return value
 
 
-Whole = Annotated[int, BeforeValidator(_not_a_bool)]
-ChannelNumber = Annotated[Whole, range_of(CHANNEL)]
-Time = Annotated[Number, Field(ge=0.0, le=1e6)]
-Frequency = Annotated[Number, Field(ge=1.0, le=1e9)]
+StrictInt = Annotated[int, BeforeValidator(_not_a_bool)]
+ChannelNumber = Annotated[StrictInt, range_of(CHANNEL)]
+Time = Annotated[StrictFloat, Field(ge=0.0, le=1e6)]
+Frequency = Annotated[StrictFloat, Field(ge=1.0, le=1e9)]
 ChannelPair = tuple[ChannelNumber, ChannelNumber]

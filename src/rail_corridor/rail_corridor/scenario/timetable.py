@@ -6,10 +6,10 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from rail_world.line.description_base import Description, Name, Number
+from rail_world.line.description_base import Description, Name, StrictFloat
 from rail_world.trains.description import TrainDescription
 
-from .section_fields import Whole
+from .section_fields import StrictInt
 
 CLEARING_TIME_S: Final = 30.0
 """Time after which a departed train has left the place it departed from [s]."""
@@ -35,8 +35,8 @@ class TrainTemplate(TrainDescription):
 class Timetable(Description):
     """Trains alike that depart one after the other."""
 
-    count: Whole = Field(ge=1, le=100, description="number of trains")
-    headway_s: Number = Field(
+    count: StrictInt = Field(ge=1, le=100, description="number of trains")
+    headway_s: StrictFloat = Field(
         ge=CLEARING_TIME_S, le=1e5, description="time from one departure to the next [s]"
     )
     train: TrainTemplate = Field(description="the train; its depart_s is that of the first")

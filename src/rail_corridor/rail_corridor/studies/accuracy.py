@@ -1,4 +1,4 @@
-"""The accuracy that geometry allows: the bound of Doppler positions along a line, as a picture."""
+"""The accuracy that geometry allows: the bound of Doppler positions along a line, as a figure."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def run_accuracy(
     """
     if REFERENCES.of(scenario) is None:
         raise InputError("has no reference stations", field="references", value=None)
-    found = [accuracy_of(scenario, track, speeds_kmh) for track in scenario.tracks]
+    bounds = [accuracy_of(scenario, track, speeds_kmh) for track in scenario.tracks]
     table = Table(
         title="what geometry allows: bound of a Doppler position, one block",
         title_justify="left",
@@ -75,7 +75,7 @@ def run_accuracy(
     for heading in ("track", "km", "stations", "km/h", "median m", "95 % m", "< 1 m", "< 10 m"):
         left = heading == "track"
         table.add_column(heading, justify="left" if left else "right", no_wrap=True)
-    for line in found:
+    for line in bounds:
         for speed, bound in zip(line.speeds_kmh, line.bound_m, strict=True):
             shares = [f"{100.0 * np.mean(bound < good):.0f} %" for good in _GOOD_M]
             quantiles = np.quantile(bound, (0.5, 0.95), method="higher")
@@ -88,8 +88,8 @@ def run_accuracy(
                 *shares,
             )
     console.print(table)
-    draw_accuracy(found, path)
-    console.print(f"picture written to {path}", soft_wrap=True)
+    draw_accuracy(bounds, path)
+    console.print(f"figure written to {path}", soft_wrap=True)
 
 
 def draw_accuracy(lines: Sequence[Accuracy], path: Path) -> None:

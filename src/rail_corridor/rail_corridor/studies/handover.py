@@ -24,7 +24,7 @@ _RUN_TIMEOUT_S = 1800.0
 
 
 @dataclass
-class Row:
+class HandoverRow:
     """Counts of one situation over all of its runs.
 
     ``misleading_ticks`` counts positions claimed to be known that are off by more than six
@@ -73,7 +73,7 @@ class Row:
 
 def run_campaign(
     situations: Iterable[Situation], crossings: int, seed: int, console: Console
-) -> Iterator[Row]:
+) -> Iterator[HandoverRow]:
     """Run every situation until it has made so many crossings; yield its counts.
 
     Raises
@@ -82,7 +82,7 @@ def run_campaign(
         If a run did not come to its report.
     """
     for situation in situations:
-        row = Row(situation)
+        row = HandoverRow(situation)
         while row.crossings < crossings:
             trains = MOST_TRAINS[situation.manoeuvre]
             if row.trains:
@@ -104,7 +104,7 @@ def run_campaign(
         yield row
 
 
-def print_rows(rows: Iterable[Row], console: Console) -> None:
+def print_rows(rows: Iterable[HandoverRow], console: Console) -> None:
     """Show the campaign as a table."""
     table = Table(title="Handover campaign", title_justify="left", title_style="bold")
     table.add_column("situation")
@@ -126,6 +126,6 @@ def print_rows(rows: Iterable[Row], console: Console) -> None:
     console.print(table)
 
 
-def write_rows(rows: Iterable[Row], path: Path) -> None:
+def write_rows(rows: Iterable[HandoverRow], path: Path) -> None:
     """Write the campaign as a list of objects, one per situation."""
     path.write_text(json.dumps([asdict(row) for row in rows], indent=2) + "\n")

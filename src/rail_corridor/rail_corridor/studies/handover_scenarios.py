@@ -86,9 +86,9 @@ def scenario_data(situation: Situation, trains: int, seed: int) -> dict[str, Any
     }
     if situation.manoeuvre == "running":
         data["trains"] = [_through_train(situation, index, rng) for index in range(trains)]
-        way_m = max(_PLAIN_M, _TRUNK_M + _AFTER_M)
+        route_m = max(_PLAIN_M, _TRUNK_M + _AFTER_M)
         last_s = data["trains"][-1]["depart_s"]
-        data["duration_s"] = last_s + way_m / (situation.speed_kmh / 3.6) + 2.0
+        data["duration_s"] = last_s + route_m / (situation.speed_kmh / 3.6) + 2.0
     else:
         layout = layout_of(parse_scenario(data))
         places = _places(situation, layout, seed)[:trains]

@@ -22,8 +22,8 @@ from rail_corridor.run.child_run import RunFailedError, report_of
 
 from .kill_scenarios import DURATION_S, TICK_S, KillCase, draw_case
 
-#: Wall time after which a silent node is given up [s], a share of it for each: long, as on a busy
-#: host living nodes would be given up too, and the run be no longer one of a single failure.
+#: Wall time after which a silent node is given up [s], a fraction of it for each: long, as on a
+#: busy host living nodes would be given up too, and the run be no longer one of a single failure.
 _SILENCE_S = 40.0
 _RUN_TIMEOUT_S = 600.0
 
@@ -85,7 +85,7 @@ class KillRow:
     @property
     def violations(self) -> tuple[str, ...]:
         """Everything that must not happen; empty in a good run."""
-        found = {
+        happenings = {
             "passed its end of authority": self.passed_authority,
             "touched another train": self.touched,
             "overspeed": self.overspeed_s,
@@ -94,7 +94,7 @@ class KillRow:
             "did not go on": not self.complete,
             "the dead node was not missed": self.node not in self.given_up,
         }
-        return tuple(name for name, happened in found.items() if happened)
+        return tuple(name for name, happened in happenings.items() if happened)
 
 
 def row_of(case: KillCase, report: dict[str, Any]) -> KillRow:

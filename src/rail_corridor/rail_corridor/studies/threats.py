@@ -19,7 +19,7 @@ import numpy as np
 
 from rail_msgs_py.stamps import NANOSECONDS, seconds_to_ns
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
-from rail_msgs_py.train_radio.safe_frame import Kind
+from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.safe_result import Accepted, Greeted, Opened
 from rail_world.train_radio.frame_threats import Arrival, FrameThreats, Link, Threat, ThreatRates
 
@@ -33,14 +33,14 @@ PERIOD_S: Final = 0.25
 _MAX_AGE_NS = seconds_to_ns(MAX_AGE_S)
 _CONTROLLER = 1
 _TRAINS = (101, 102, 103)
-_SECRET = b"the secret of the threat campaign"
+_KEY = b"the secret of the threat campaign"
 _CAMPAIGN_STREAM = 50159
 
 
 class End(Protocol):
     """What the campaign asks of one end."""
 
-    def seal(self, kind: Kind, payload: bytes, time_ns: int) -> bytes:
+    def seal(self, kind: FrameKind, payload: bytes, time_ns: int) -> bytes:
         """Frame to send."""
 
     def open(self, frame: bytes, time_ns: int) -> Opened:
@@ -48,12 +48,12 @@ class End(Protocol):
 
 
 #: Makes the end (own, peer) that takes one kind of data, with a source of random bytes.
-MakeEnd = Callable[[int, int, Kind, Callable[[int], bytes]], End]
+MakeEnd = Callable[[int, int, FrameKind, Callable[[int], bytes]], End]
 
 
-def safe_end(own: int, peer: int, kind: Kind, draw: Callable[[int], bytes]) -> SafeChannel:
+def safe_end(own: int, peer: int, kind: FrameKind, draw: Callable[[int], bytes]) -> SafeChannel:
     """The end under test."""
-    return SafeChannel(_SECRET, own, peer, [kind], draw, max_age_s=MAX_AGE_S)
+    return SafeChannel(_KEY, own, peer, [kind], draw, max_age_s=MAX_AGE_S)
 
 
 @dataclass(slots=True)
@@ -96,7 +96,7 @@ class CampaignRow:
 class _Sealed(NamedTuple):
     order: int
     time_ns: int
-    kind: Kind
+    kind: FrameKind
     payload: bytes
 
 
@@ -109,7 +109,7 @@ class _Oracle:
         self._started = dict.fromkeys(self._sealed, 0)
         self._order = 0
 
-    def seal(self, link: Link, frame: bytes, time_ns: int, kind: Kind, payload: bytes) -> None:
+    def seal(self, link: Link, frame: bytes, time_ns: int, kind: FrameKind, payload: bytes) -> None:
         self._sealed[link][frame] = _Sealed(self._order, time_ns, kind, payload)
         self._order += 1
 
@@ -205,8 +205,8 @@ def _run(frames: int, group: Sequence[Threat], seed: int, make_end: MakeEnd) -> 
     return row
 
 
-def _kind_on(link: Link) -> Kind:
-    return Kind.LOCATION_REPORT if link[1] == _CONTROLLER else Kind.MOVEMENT_AUTHORITY
+def _kind_on(link: Link) -> FrameKind:
+    return FrameKind.LOCATION_REPORT if link[1] == _CONTROLLER else FrameKind.MOVEMENT_AUTHORITY
 
 
 def _judge(row: CampaignRow, oracle: _Oracle, arrival: Arrival, opened: Opened) -> None:

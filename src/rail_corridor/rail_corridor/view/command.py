@@ -29,7 +29,7 @@ def view(
     ] = "127.0.0.1",
     domain: Annotated[
         int | None,
-        typer.Option("--domain", help="ROS domain; of ROS_DOMAIN_ID if not said.", metavar="N"),
+        typer.Option("--domain", help="ROS domain; that of ROS_DOMAIN_ID by default.", metavar="N"),
     ] = None,
 ) -> None:
     """Show a running or replayed corridor on a live page, until interrupted."""
@@ -42,7 +42,7 @@ def run_view(host: str, port: int, domain: int | None) -> int:
     Raises
     ------
     InputError
-        If the address cannot be served on, or the domain is none.
+        If the address cannot be served on, or the domain is not valid.
     """
     number = _domain(domain)
     if not 0 <= port <= 65535:
@@ -70,9 +70,9 @@ def run_view(host: str, port: int, domain: int | None) -> int:
     return 0
 
 
-def _domain(given: int | None) -> int:
-    field = "--domain" if given is not None else "ROS_DOMAIN_ID"
-    text = str(given) if given is not None else os.environ.get("ROS_DOMAIN_ID") or "0"
+def _domain(requested: int | None) -> int:
+    field = "--domain" if requested is not None else "ROS_DOMAIN_ID"
+    text = str(requested) if requested is not None else os.environ.get("ROS_DOMAIN_ID") or "0"
     if not (text.isdecimal() and int(text) <= MOST_DOMAIN):
         raise InputError(f"must be from 0 to {MOST_DOMAIN}", field=field, value=text)
     return int(text)

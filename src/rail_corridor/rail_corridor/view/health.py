@@ -82,10 +82,10 @@ class Health:
 
     def counts(self) -> dict[str, int]:
         """How many statuses of each level there are, and failed nodes."""
-        found = {"ok": 0, "warn": 0, "error": 0, "stale": 0}
+        counts = {"ok": 0, "warn": 0, "error": 0, "stale": 0}
         for status in self._status.values():
-            found[status["level"]] = found.get(status["level"], 0) + 1
-        return found | {"failed": len(self._failed)}
+            counts[status["level"]] = counts.get(status["level"], 0) + 1
+        return counts | {"failed": len(self._failed)}
 
     def _put(self, status: Any, stamp_s: float) -> None:
         level = _LEVELS.get(status.level, "error")

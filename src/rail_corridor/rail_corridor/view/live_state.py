@@ -266,8 +266,8 @@ class LiveStateStore(LiveState):
         points = []
         for index in [*range(0, last, step), last]:
             place = path.poses[index].pose.position
-            share = index / max(last, 1)
-            points.append([round(share, 6), round(place.x, 1), round(place.y, 1)])
+            fraction = index / max(last, 1)
+            points.append([round(fraction, 6), round(place.x, 1), round(place.y, 1)])
         self.paths[name.split("/")[2]] = points
         self.run += 1
 
@@ -278,7 +278,7 @@ class LiveStateStore(LiveState):
                 self.log(view.panel.name).put(view.log_entries(self.line, name, raw))
 
     def _on_array(self, name: str, raw: bytes) -> None:
-        """A table, or the block of a scope; of what kind a stranger is, its layout tells."""
+        """A table, or the block of a scope; of what kind a external node is, its layout tells."""
         kind = kind_of(name)
         if name in self.not_tables or (kind is not None and kind.view is Waveform):
             self.blocks[name] = raw

@@ -13,7 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 SERVICE_TYPE = "lifecycle_msgs/srv/ChangeState"
-_ENDING = "/change_state"
+_SUFFIX = "/change_state"
 ANSWER_S = 5.0
 
 
@@ -24,9 +24,9 @@ def equipment_of(services: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ..
     ('/wrs9', '/wrs10')
     """
     names = (
-        name.removesuffix(_ENDING)
+        name.removesuffix(_SUFFIX)
         for name, types in services
-        if name.endswith(_ENDING) and SERVICE_TYPE in types
+        if name.endswith(_SUFFIX) and SERVICE_TYPE in types
     )
     return tuple(sorted(names, key=natural))
 
@@ -51,7 +51,7 @@ class Switches:
         """Switch; returns why it did not work, empty if it did. Waits for the answer."""
         transition = Transition.TRANSITION_ACTIVATE if on else Transition.TRANSITION_DEACTIVATE
         with self._lock:
-            client = self._node.create_client(ChangeState, equipment + _ENDING)
+            client = self._node.create_client(ChangeState, equipment + _SUFFIX)
             executor = SingleThreadedExecutor(context=self._context)
             executor.add_node(self._node)
             try:

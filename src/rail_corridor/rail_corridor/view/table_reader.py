@@ -6,7 +6,7 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray
 
-from rail_msgs_py.table import Table, figures_from_cdr
+from rail_msgs_py.table import Table, values_from_cdr
 
 
 class TableReader:
@@ -31,5 +31,5 @@ class TableReader:
             self._last, self._length = last, len(raw)
             self._prefix = bytes(raw[: len(raw) - 8 * (1 + last.values.size)])
             return last
-        stamp_ns, values = figures_from_cdr(raw, len(last.rows), len(last.columns))
+        stamp_ns, values = values_from_cdr(raw, len(last.rows), len(last.columns))
         return Table(stamp_ns, last.rows, last.columns, np.asarray(values))

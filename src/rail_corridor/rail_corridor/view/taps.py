@@ -49,10 +49,10 @@ class Taps:
         for name, (_, subscription) in list(self._held.items()):
             for _ in range(_MOST_AT_ONCE):
                 with subscription.handle:
-                    taken = subscription.handle.take_message(subscription.msg_type, True)
-                if taken is None:
+                    received = subscription.handle.take_message(subscription.msg_type, True)
+                if received is None:
                     break
-                yield name, taken[0]
+                yield name, received[0]
 
     def _open(self, name: str, tap: Tap) -> Any:
         qos = (

@@ -81,8 +81,8 @@ def wanted(
     details : mapping
         Train to the topics beyond its namespace that are read while it is looked at.
     ticking : bool
-        Whether ticks run. Before the first one a stream must not be read by strangers: nodes take
-        any reader of what they send for the one that they wait for.
+        Whether ticks run. Before the first one a stream must not be read by external nodes: nodes
+        take any reader of what they send for the one that they wait for.
     """
     taps = {
         topic.name(): Tap(

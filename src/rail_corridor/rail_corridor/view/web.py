@@ -113,7 +113,7 @@ async def _serve(server: _Server, bridge: Bridge, bound: socket.socket) -> None:
 
 
 async def _read(bridge: Bridge) -> None:
-    """Read the topics for ever, at a steady pace."""
+    """Read the topics indefinitely, at a steady pace."""
     loop = asyncio.get_running_loop()
     due_s = loop.time()
     while True:
@@ -141,7 +141,7 @@ def _asked(values: Any) -> Asked:
     Raises
     ------
     ValueError
-        If a number is none; the line quotes it.
+        If a value is not a number; the line quotes it.
     """
     fields: dict[str, Any] = {}
     for name, default in Asked.__dataclass_fields__.items():

@@ -1,4 +1,4 @@
-"""The picture of ``rail tdr``: the trace, what explains it, where the cars and the fault are."""
+"""The figure of ``rail tdr``: the trace, what explains it, where the cars and the fault are."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _draw(figure: Figure, diagnosis: Diagnosis) -> None:
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     traces, fit = diagnosis.reflectogram, diagnosis.reading.fit
     consist = diagnosis.consist
-    line = consist.line(diagnosis.reading.deviations)
+    line = consist.bus_line(diagnosis.reading.deviations)
     # Half the way of a wave, at the mean speed of this line.
     metres = traces.time_s * (line.length_m / line.delay_s) / 2.0
     summary = summarise(traces)
@@ -47,10 +47,10 @@ def _draw(figure: Figure, diagnosis: Diagnosis) -> None:
     top = upper.get_ylim()[1]
     for number, middle_m in enumerate(0.5 * (starts_m[1:] + starts_m[:-1]), start=1):
         upper.text(middle_m, top, f"car {number}", ha="center", va="bottom", color="0.4")
-    found = diagnosis.reading.finding
-    if found is not None:
-        words = fault_words(found.kind, found.car, found.place_m, size_of(found))
-        upper.axvline(found.place_m, color=COLOURS[3], label=words)
+    finding = diagnosis.reading.finding
+    if finding is not None:
+        words = fault_words(finding.kind, finding.car, finding.place_m, size_of(finding))
+        upper.axvline(finding.place_m, color=COLOURS[3], label=words)
     upper.set_ylabel("reflection")
     upper.legend(loc="best")
     left = trace[: len(model)] - model

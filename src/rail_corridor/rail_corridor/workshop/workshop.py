@@ -17,15 +17,15 @@ from rich.table import Table
 
 from rail_corridor.errors import InputError
 from rail_signals.arrays import FloatArray
+from rail_signals.train_bus.bus_line import Termination
 from rail_signals.train_bus.consist import Consist
 from rail_signals.train_bus.fault_words import fault_words, size_of
-from rail_signals.train_bus.line import Termination
 from rail_signals.train_bus.profile import bus_profile_names
 from rail_signals.train_bus.tdr.interpretation import Interpretation, interpret
 from rail_signals.train_bus.tdr.measured_trace import from_ohms, step_answer, step_edge
 from rail_signals.train_bus.tdr.reflectometer import Reflectogram, Reflectometer
 from rail_signals.train_bus.tdr.response import SAMPLES_PER_RISE, lead_in_s
-from rail_signals.train_bus.tdr.run import RunReading, read_run
+from rail_signals.train_bus.tdr.single_cable import CableReading, read_single_cable
 from rail_signals.train_bus.tdr.traces import noise_level
 from rail_signals.train_bus.tdr.verdict import RunVerdict, judge, judge_train
 from rail_signals.train_bus.train import cable_consist, train_consist, train_profiles
@@ -38,7 +38,7 @@ End = Literal["terminated", "open", "short"]
 #: What is at the far end, and as what it is read.
 _ENDS: Final = {"terminated": "matched", "open": "open", "short": "short"}
 #: Beyond the delay as drawn, and the edge at the far end.
-_WINDOW_SHARE: Final = 1.1
+_WINDOW_FRACTION: Final = 1.1
 _EDGES: Final = 3.0
 #: No passive line reflects more than it gets, but instruments overshoot.
 _LARGEST_REFLECTION: Final = 1.5
@@ -132,7 +132,7 @@ def diagnose(path: Path, workshop: Workshop) -> Diagnosis:
     instrument = replace(instrument, sample_period_s=period_s, noise_rms=noise)
     if _is_bare(workshop):
         # Of a cable by itself no more is known than its profile: it may have any length.
-        run = read_run(traces, profiles[0], instrument)
+        run = read_single_cable(traces, profiles[0], instrument)
         remark = "" if run.end == _ENDS[workshop.end] else _remark(run, workshop.end)
         return Diagnosis(traces, run.interpretation, run.consist, (run.verdict,), remark)
     reading = interpret(traces, consist, instrument)
@@ -144,7 +144,7 @@ def _is_bare(workshop: Workshop) -> bool:
     return len(workshop.profiles) == 1 and not workshop.has_node
 
 
-def _remark(run: RunReading, end: End) -> str:
+def _remark(run: CableReading, end: End) -> str:
     length = run.verdict.measurement.length_m
     where = "" if length is None else f" at {length:.1f} m"
     return f"the cable is {run.end}{where}, not {end}"
@@ -205,9 +205,9 @@ def _from_trace(
         )
     # What is sampled finer than any edge needs is averaged.
     group = max(1, int(coarsest_s / step_s * (1.0 + 1e-6)))
-    whole = len(time_s) // group * group
-    time_s = time_s[:whole].reshape(-1, group).mean(axis=1)
-    return time_s, values[:, :whole].reshape(len(values), -1, group).mean(axis=2)
+    kept = len(time_s) // group * group
+    time_s = time_s[:kept].reshape(-1, group).mean(axis=1)
+    return time_s, values[:, :kept].reshape(len(values), -1, group).mean(axis=2)
 
 
 def _from_spectrum(
@@ -240,8 +240,8 @@ def _window(
             field="time",
             value=float(time_s[0]),
         )
-    echo_s = 2.0 * consist.line().delay_s
-    last_s = _WINDOW_SHARE * echo_s + _EDGES * instrument.rise_time_s
+    echo_s = 2.0 * consist.bus_line().delay_s
+    last_s = _WINDOW_FRACTION * echo_s + _EDGES * instrument.rise_time_s
     if time_s[-1] < last_s:
         raise InputError(
             f"the trace is too short: the echo of the far end comes at {echo_s * 1e9:.0f} ns,"
@@ -249,14 +249,14 @@ def _window(
             field="time",
             value=float(time_s[-1]),
         )
-    samples = instrument.samples_for(consist.line().delay_s)
-    begin = int(np.searchsorted(time_s, -lead_in_s(instrument.rise_time_s)))
-    end = begin + max(samples, 16)
-    return time_s[begin:end], rows[:, begin:end]
+    samples = instrument.samples_for(consist.bus_line().delay_s)
+    start = int(np.searchsorted(time_s, -lead_in_s(instrument.rise_time_s)))
+    end = start + max(samples, 16)
+    return time_s[start:end], rows[:, start:end]
 
 
 def print_diagnosis(diagnosis: Diagnosis, workshop: Workshop, console: Console) -> None:
-    """Show the figures of each car, the faults and the verdict."""
+    """Show the values of each car, the faults and the verdict."""
     table = Table(title="bus cable, car by car", title_justify="left", title_style="bold")
     for heading in ("car", "profile", "length m", "impedance ohm", "attenuation dB", "verdict"):
         side: Any = "right" if heading[-1] in "mB" else "left"
@@ -287,8 +287,8 @@ def print_diagnosis(diagnosis: Diagnosis, workshop: Workshop, console: Console) 
             console.print("no fault found")
     else:
         doubt = "" if reading.is_explained else " (it does not explain all of the trace)"
-        found = reading.finding
-        words = fault_words(found.kind, found.car, found.place_m, size_of(found))
+        finding = reading.finding
+        words = fault_words(finding.kind, finding.car, finding.place_m, size_of(finding))
         console.print(f"fault: {words}{doubt}", soft_wrap=True, highlight=False)
         for kind, probability in reading.alternatives[:3]:
             if probability >= 0.01:

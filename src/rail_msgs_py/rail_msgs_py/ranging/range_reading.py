@@ -18,7 +18,7 @@ from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, to_ns
 
 _STAMP = struct.Struct("<iI")
 _TAIL = struct.Struct("<5f")
-_FIGURES = struct.Struct("<2f")
+_VALUES = struct.Struct("<2f")
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class RangeReading:
     zone : str
         Zone that the antenna looks into (``header.frame_id``).
     range_m, variance_m2 : float
-        Straight-line distance; ``inf`` = nothing heard, ``nan`` = not to be used.
+        Straight-line distance; ``inf`` = no signal, ``nan`` = not to be used.
     min_range_m, max_range_m : float
         Unambiguous interval of the comparator.
     """
@@ -91,17 +91,17 @@ class RangeReading:
         """In words, without the time."""
         if self.usable:
             return f"{self.zone}: {self.range_m:.3f} m ± {math.sqrt(self.variance_m2):.3f} m"
-        return f"{self.zone}: {'disturbed' if self.disturbed else 'nothing heard'}"
+        return f"{self.zone}: {'disturbed' if self.disturbed else 'no signal'}"
 
 
 def range_from_cdr(raw: bytes) -> tuple[int, float, float]:
     """Stamp [ns], range [m] and variance [m^2] of a serialised reading, and no more."""
-    range_m, variance_m2 = _FIGURES.unpack_from(raw, len(raw) - _FIGURES.size)
+    range_m, variance_m2 = _VALUES.unpack_from(raw, len(raw) - _VALUES.size)
     return clock_from_cdr(raw), range_m, variance_m2
 
 
 class RangeWriter:
-    """Serialises the readings of one antenna: only stamp and figures change."""
+    """Serialises the readings of one antenna: only stamp and values change."""
 
     def __init__(self, zone: str, min_range_m: float, max_range_m: float) -> None:
         blank = RangeReading(0, zone, 0.0, 0.0, min_range_m, max_range_m)
@@ -115,6 +115,6 @@ class RangeWriter:
                 self._head,
                 _STAMP.pack(*divmod(stamp_ns, NANOSECONDS)),
                 self._middle,
-                _FIGURES.pack(range_m, variance_m2),
+                _VALUES.pack(range_m, variance_m2),
             )
         )

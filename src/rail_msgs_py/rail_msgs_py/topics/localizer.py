@@ -13,14 +13,14 @@ from rail_msgs_py.table import Table
 from .qos import ESTIMATE, STREAM
 from .topic import Topic
 
-TOLD_POSITION: Final = Topic(
-    "/{train}/atp/told_position",
+RELAYED_RANGE: Final = Topic(
+    "/{train}/atp/relayed_range",
     Float64MultiArray,
     STREAM,
     Table,
     "atp",
     "localizer",
-    "Where the wayside ranged the front of the train, as told over the radio, and when.",
+    "Where the wayside ranged the front of the train, as relayed by radio, and when.",
     columns=("time_s", "position_m", "half_m"),
 )
 LOCALIZER_POSITION: Final = Topic(
@@ -49,7 +49,7 @@ LOCALIZER_STATE: Final = Topic(
 
 #: In the order of the documentation.
 TOPICS: Final[tuple[Topic, ...]] = (
-    TOLD_POSITION,
+    RELAYED_RANGE,
     LOCALIZER_POSITION,
     LOCALIZER_STATE,
 )

@@ -65,10 +65,10 @@ def profile_from(fields: Mapping[str, Any]) -> QoSProfile:
 
 
 def _value(fields: Mapping[str, Any], key: str, names: Mapping[Any, str]) -> Any:
-    given = fields.get(key)
-    if given in ("unknown", "system_default", "best_available", 0, 3, 4):
+    value = fields.get(key)
+    if value in ("unknown", "system_default", "best_available", 0, 3, 4):
         return None
     for policy, name in names.items():
-        if given in (name, int(policy)):
+        if value in (name, int(policy)):
             return policy
-    raise ValueError(f"{key}: {given!r}: must be one of {', '.join(names.values())}")
+    raise ValueError(f"{key}: {value!r}: must be one of {', '.join(names.values())}")

@@ -53,7 +53,7 @@ RANGE: Final = Topic(
     RangeReading,
     "wrs",
     "zone_controller",
-    "Range to the train in the zone with its variance; inf = nothing heard, nan = unusable.",
+    "Range to the train in the zone with its variance; inf = no signal, nan = unusable.",
     below_owner=2,
 )
 VRS_RX: Final = Topic(

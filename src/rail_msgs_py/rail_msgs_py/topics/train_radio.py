@@ -129,7 +129,7 @@ RADIO_LINK: Final = Topic(
     Table,
     "cbtc_radio",
     "people, the report",
-    "Channel in force after the tick, the beacon's signal-to-noise ratio on it, bursts heard.",
+    "Channel in force after the tick, the beacon's signal-to-noise ratio on it, bursts received.",
     columns=("channel", "beacon_snr", "bursts"),
 )
 CBTC_LINKS: Final = Topic(

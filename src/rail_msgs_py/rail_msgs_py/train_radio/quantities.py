@@ -55,11 +55,9 @@ TUNNEL_LOSS_PER_M: Final = TUNNEL_LOSS.derived(
     lambda db_per_km: db_per_km / 1000.0, "loss within a tunnel", unit="dB/m"
 )
 
-BRAKING: Final = Quantity(
-    0.7, "service braking that is counted on", unit="m/s^2", low=0.1, high=2.0
-)
+BRAKING: Final = Quantity(0.7, "guaranteed service brake rate", unit="m/s^2", low=0.1, high=2.0)
 EMERGENCY_BRAKING: Final = Quantity(
-    0.9, "emergency braking that is counted on", unit="m/s^2", low=0.1, high=3.0
+    0.9, "guaranteed emergency brake rate (GEBR)", unit="m/s^2", low=0.1, high=3.0
 )
 MARGIN: Final = Quantity(10.0, "kept behind a train ahead", unit="m", low=0.0, high=1000.0)
 AUTHORITY_TIMEOUT: Final = Quantity(

@@ -46,17 +46,17 @@ from .safe_frame import (
     PAYLOAD_BYTES,
     VERSION,
     DirectionKeys,
+    FrameKind,
     Header,
-    Kind,
     SafetyCode,
     SessionKey,
     payload_of,
     read_header,
 )
-from .safe_result import Accepted, Greeted, Opened, Reason, Rejected
+from .safe_result import Accepted, Greeted, Opened, Rejected, RejectionReason
 
 _NO_NONCE: Final = bytes(NONCE_BYTES)
-_GREETING: Final = int(Kind.GREETING)
+_GREETING: Final = int(FrameKind.GREETING)
 
 
 @dataclass(slots=True)
@@ -74,7 +74,7 @@ class SafeChannel:
 
     Parameters
     ----------
-    secret : bytes
+    authentication_key : bytes
         Of the scenario, 16 bytes at least, the same at both ends.
     own, peer : int
         Identities, 0 to 65535, different.
@@ -93,10 +93,10 @@ class SafeChannel:
 
     def __init__(
         self,
-        secret: bytes,
+        authentication_key: bytes,
         own: int,
         peer: int,
-        accepts: Iterable[Kind],
+        accepts: Iterable[FrameKind],
         draw: Callable[[int], bytes],
         *,
         max_age_s: float = 1.0,
@@ -111,10 +111,10 @@ class SafeChannel:
         check_number("clock_skew_s", clock_skew_s, 0.0, max_age_s)
         check_number("session_timeout_s", session_timeout_s, max_age_s, 1e6)
         self.own, self.peer = own, peer
-        self._accepts = {int(kind): kind for kind in accepts if kind is not Kind.GREETING}
+        self._accepts = {int(kind): kind for kind in accepts if kind is not FrameKind.GREETING}
         self._draw = draw
-        self._transmit = DirectionKeys(secret, own, peer)
-        self._receive = DirectionKeys(secret, peer, own)
+        self._transmit = DirectionKeys(authentication_key, own, peer)
+        self._receive = DirectionKeys(authentication_key, peer, own)
         self._max_age_ns = seconds_to_ns(max_age_s)
         self._skew_ns = seconds_to_ns(clock_skew_s)
         self._timeout_ns = seconds_to_ns(session_timeout_s)
@@ -123,7 +123,7 @@ class SafeChannel:
         self._candidate: _Session | None = None
         self._answer_owed = self._greeted_last = False
         self._greeting_ns = -1
-        self._heard_ns = 0
+        self._last_accepted_ns = 0
         self._newest_ns: int | None = None
 
     @property
@@ -137,7 +137,7 @@ class SafeChannel:
             return math.inf
         return (time_ns - self._newest_ns + self._skew_ns) / NANOSECONDS
 
-    def seal(self, kind: Kind, payload: bytes, time_ns: int) -> bytes:
+    def seal(self, kind: FrameKind, payload: bytes, time_ns: int) -> bytes:
         """Frame of 64 bytes to send now.
 
         It is a greeting, without the payload, while there is no session, and once when the peer
@@ -148,7 +148,7 @@ class SafeChannel:
         ValueError
             If the kind is that of greetings, the payload too long or the time out of range.
         """
-        if kind is Kind.GREETING:
+        if kind is FrameKind.GREETING:
             raise ValueError("kind must be one of data, got GREETING")
         if len(payload) > PAYLOAD_BYTES:
             raise ValueError(f"payload must have at most {PAYLOAD_BYTES} bytes, got {len(payload)}")
@@ -156,7 +156,7 @@ class SafeChannel:
             raise ValueError(f"time_ns must be from 0 to {LAST_TIME_NS}, got {time_ns!r}")
         session = self._session
         if session is not None and (
-            time_ns - self._heard_ns > self._timeout_ns or session.sent >= LAST_SEQUENCE
+            time_ns - self._last_accepted_ns > self._timeout_ns or session.sent >= LAST_SEQUENCE
         ):
             session = self._session = None
         # Every other frame at most is an answer, so that recorded greetings cannot stop the data.
@@ -182,32 +182,32 @@ class SafeChannel:
         self._answer_owed, self._greeted_last = False, True
         echo = self._candidate.peer_nonce if self._candidate else _NO_NONCE
         header = Header(
-            VERSION, Kind.GREETING, 2 * NONCE_BYTES, self.own, self.peer, 0, time_ns, 0, 0
+            VERSION, FrameKind.GREETING, 2 * NONCE_BYTES, self.own, self.peer, 0, time_ns, 0, 0
         )
         return self._transmit.greeting.seal(header, self._offer + echo)
 
     def open(self, frame: bytes, time_ns: int) -> Opened:
         """What to make of bytes that arrived now; it never raises, whatever they are."""
         if len(frame) != FRAME_BYTES:
-            return Rejected(Reason.MALFORMED)
+            return Rejected(RejectionReason.MALFORMED)
         header = read_header(frame)
         if header.version != VERSION or header.length > PAYLOAD_BYTES:
-            return Rejected(Reason.MALFORMED)
+            return Rejected(RejectionReason.MALFORMED)
         greeting = header.kind == _GREETING
         if not greeting and header.kind not in self._accepts:
-            return Rejected(Reason.UNEXPECTED_KIND)
+            return Rejected(RejectionReason.UNEXPECTED_KIND)
         if header.source != self.peer or header.destination != self.own:
-            return Rejected(Reason.WRONG_ADDRESS)
+            return Rejected(RejectionReason.WRONG_ADDRESS)
         if greeting:
             if not self._genuine(self._receive.greeting, frame):
-                return Rejected(Reason.SAFETY_CODE)
+                return Rejected(RejectionReason.SAFETY_CODE)
             reason = self._untimely(header, time_ns) or _disorder(header.time_ns, self._greeting_ns)
             return Rejected(reason) if reason else self._greet(header, payload_of(frame), time_ns)
         session = self._session_of(header.mark)
         if session is None:
-            return Rejected(Reason.UNKNOWN_SESSION)
+            return Rejected(RejectionReason.UNKNOWN_SESSION)
         if not self._genuine(session.receive.code, frame):
-            return Rejected(Reason.SAFETY_CODE)
+            return Rejected(RejectionReason.SAFETY_CODE)
         reason = self._untimely(header, time_ns) or self._misplaced(header, session)
         if reason:
             return Rejected(reason)
@@ -222,14 +222,14 @@ class SafeChannel:
                 return session
         return None
 
-    def _untimely(self, header: Header, time_ns: int) -> Reason | None:
+    def _untimely(self, header: Header, time_ns: int) -> RejectionReason | None:
         age_ns = time_ns - header.time_ns
         if age_ns < -self._skew_ns:
-            return Reason.FROM_THE_FUTURE
+            return RejectionReason.FROM_THE_FUTURE
         # The peer's clock may be fast by the skew: the frame is older than it looks.
-        return Reason.TOO_OLD if age_ns + self._skew_ns > self._max_age_ns else None
+        return RejectionReason.TOO_OLD if age_ns + self._skew_ns > self._max_age_ns else None
 
-    def _misplaced(self, header: Header, session: _Session) -> Reason | None:
+    def _misplaced(self, header: Header, session: _Session) -> RejectionReason | None:
         return _disorder(header.sequence, session.newest)
 
     def _accept(self, header: Header, payload: bytes, session: _Session, time_ns: int) -> Accepted:
@@ -237,7 +237,7 @@ class SafeChannel:
             self._establish(session)
         lost = header.sequence - session.newest - 1
         session.newest = header.sequence
-        self._heard_ns, self._newest_ns = time_ns, header.time_ns
+        self._last_accepted_ns, self._newest_ns = time_ns, header.time_ns
         age_s = (time_ns - header.time_ns + self._skew_ns) / NANOSECONDS
         kind = self._accepts[header.kind]
         return Accepted(kind, payload, age_s, header.sequence, lost, header.feedback)
@@ -263,7 +263,7 @@ class SafeChannel:
                 self._receive.session(nonce, self._offer),
             )
         if proved:
-            self._heard_ns = time_ns
+            self._last_accepted_ns = time_ns
             self._establish(candidate)
         else:
             self._answer_owed = True
@@ -275,7 +275,7 @@ class SafeChannel:
         self._answer_owed = False
 
 
-def _disorder(number: int, newest: int) -> Reason | None:
+def _disorder(number: int, newest: int) -> RejectionReason | None:
     if number > newest:
         return None
-    return Reason.REPEATED if number == newest else Reason.OUT_OF_ORDER
+    return RejectionReason.REPEATED if number == newest else RejectionReason.OUT_OF_ORDER

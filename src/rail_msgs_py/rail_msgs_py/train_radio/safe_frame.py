@@ -48,7 +48,7 @@ FRAME_BYTES: Final = 64
 PAYLOAD_BYTES: Final = 32
 CODE_BYTES: Final = 8
 NONCE_BYTES: Final = 16
-SHORTEST_SECRET_BYTES: Final = 16
+SHORTEST_KEY_BYTES: Final = 16
 LAST_SEQUENCE: Final = 2**32 - 1
 NS_PER_TICK: Final = 1000
 LAST_TIME_NS: Final = 2**48 * NS_PER_TICK - 1
@@ -60,7 +60,7 @@ _KEY_BYTES = 16
 _MARK_BYTES = 4
 
 
-class Kind(IntEnum):
+class FrameKind(IntEnum):
     """What a frame carries."""
 
     GREETING = 0
@@ -133,9 +133,9 @@ class SafetyCode:
         return hmac.compare_digest(self.of(frame[:_CODE_AT]), frame[_CODE_AT:])
 
 
-def _derive(secret: bytes, label: bytes, length: int) -> bytes:
+def _derive(authentication_key: bytes, label: bytes, length: int) -> bytes:
     salt = b"rail corridor safe frame %d" % VERSION
-    return HKDF(SHA256(), length, salt, label).derive(secret)
+    return HKDF(SHA256(), length, salt, label).derive(authentication_key)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,23 +154,26 @@ class DirectionKeys:
 
     Parameters
     ----------
-    secret : bytes
+    authentication_key : bytes
         Of the scenario, 16 bytes at least.
     source, destination : int
         Identities of the two ends, 0 to 65535.
     """
 
-    def __init__(self, secret: bytes, source: int, destination: int) -> None:
-        if len(secret) < SHORTEST_SECRET_BYTES:
+    def __init__(self, authentication_key: bytes, source: int, destination: int) -> None:
+        if len(authentication_key) < SHORTEST_KEY_BYTES:
             raise ValueError(
-                f"secret must have {SHORTEST_SECRET_BYTES} bytes or more, got {len(secret)}"
+                f"secret must have {SHORTEST_KEY_BYTES} bytes or more,"
+                f" got {len(authentication_key)}"
             )
         pair = struct.pack(">HH", source, destination)
-        self._root = _derive(secret, b"direction" + pair, 32)
+        self._root = _derive(authentication_key, b"direction" + pair, 32)
         self.greeting = SafetyCode(_derive(self._root, b"greeting", _KEY_BYTES))
 
     def session(self, source_nonce: bytes, destination_nonce: bytes) -> SessionKey:
         """Key of the session of two nonces."""
         label = b"session" + source_nonce + destination_nonce
-        made = _derive(self._root, label, _KEY_BYTES + _MARK_BYTES)
-        return SessionKey(int.from_bytes(made[_KEY_BYTES:], "big"), SafetyCode(made[:_KEY_BYTES]))
+        derived = _derive(self._root, label, _KEY_BYTES + _MARK_BYTES)
+        return SessionKey(
+            int.from_bytes(derived[_KEY_BYTES:], "big"), SafetyCode(derived[:_KEY_BYTES])
+        )

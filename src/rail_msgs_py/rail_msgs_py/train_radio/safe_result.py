@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
-from .safe_frame import Kind
+from .safe_frame import FrameKind
 
 
-class Reason(Enum):
+class RejectionReason(Enum):
     """Why a frame was rejected; the first that applies, in this order."""
 
     MALFORMED = "malformed"
@@ -29,7 +29,7 @@ class Accepted:
 
     Parameters
     ----------
-    kind : Kind
+    kind : FrameKind
     payload : bytes
     age_s : float
         Of the time-stamp, at most: the clock skew is added.
@@ -40,7 +40,7 @@ class Accepted:
         Newest of my sequence numbers that the peer had accepted.
     """
 
-    kind: Kind
+    kind: FrameKind
     payload: bytes
     age_s: float
     sequence: int
@@ -59,7 +59,7 @@ class Greeted:
 class Rejected:
     """A frame to forget."""
 
-    reason: Reason
+    reason: RejectionReason
 
 
 Opened: TypeAlias = Accepted | Greeted | Rejected

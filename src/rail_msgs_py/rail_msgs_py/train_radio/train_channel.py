@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from .safe_channel import SafeChannel
-from .safe_frame import Kind
-from .safe_result import Accepted, Reason, Rejected
+from .safe_frame import FrameKind
+from .safe_result import Accepted, Rejected, RejectionReason
 
 CONTROLLER_IDENTITY: Final = 0xF000
 """Of the zone controller; trains have their numbers."""
@@ -16,12 +16,12 @@ CONTROLLER_IDENTITY: Final = 0xF000
 _TRAIN_NONCES, _CONTROLLER_NONCES = 5, 6
 
 
-def controller_end(secret: str, seed: int, train: int, tick_s: float) -> SafeChannel:
+def controller_end(authentication_key: str, seed: int, train: int, tick_s: float) -> SafeChannel:
     """The zone controller's end: takes location reports of a train.
 
     Parameters
     ----------
-    secret : str
+    authentication_key : str
         Hexadecimal digits.
     seed : int
         Of the nonces.
@@ -36,27 +36,31 @@ def controller_end(secret: str, seed: int, train: int, tick_s: float) -> SafeCha
         If the secret is no secret.
     """
     ends = (CONTROLLER_IDENTITY, train)
-    return _end(secret, seed, _CONTROLLER_NONCES, train, ends, Kind.LOCATION_REPORT, tick_s)
+    return _end(
+        authentication_key, seed, _CONTROLLER_NONCES, train, ends, FrameKind.LOCATION_REPORT, tick_s
+    )
 
 
-def train_end(secret: str, seed: int, train: int, tick_s: float, restarts: int = 0) -> SafeChannel:
+def train_end(
+    authentication_key: str, seed: int, train: int, tick_s: float, restarts: int = 0
+) -> SafeChannel:
     """The train's end: takes movement authorities. Parameters as of `controller_end`.
 
     ``restarts`` counts how often it was switched on anew: an end that drew the nonces of before
     would take what was recorded before, and the peer would take its greetings for old ones.
     """
     ends = (train, CONTROLLER_IDENTITY)
-    kind = Kind.MOVEMENT_AUTHORITY
-    return _end(secret, seed, _TRAIN_NONCES, train, ends, kind, tick_s, restarts)
+    kind = FrameKind.MOVEMENT_AUTHORITY
+    return _end(authentication_key, seed, _TRAIN_NONCES, train, ends, kind, tick_s, restarts)
 
 
 def _end(
-    secret: str,
+    authentication_key: str,
     seed: int,
     stream: int,
     train: int,
     ends: tuple[int, int],
-    accepts: Kind,
+    accepts: FrameKind,
     tick_s: float,
     restarts: int = 0,
 ) -> SafeChannel:
@@ -64,7 +68,9 @@ def _end(
     bits = np.random.Philox(np.random.SeedSequence(key))
     draw = np.random.Generator(bits).bytes
     max_age_s = max(1.0, 3.0 * tick_s)
-    return SafeChannel(bytes.fromhex(secret), *ends, (accepts,), draw, max_age_s=max_age_s)
+    return SafeChannel(
+        bytes.fromhex(authentication_key), *ends, (accepts,), draw, max_age_s=max_age_s
+    )
 
 
 class CountedChannel:
@@ -94,7 +100,7 @@ class CountedChannel:
         """Whether a frame is genuine, and its data if it carries any."""
         opened = self.channel.open(frame, time_ns)
         if isinstance(opened, Rejected):
-            self.rejected += opened.reason is not Reason.REPEATED
+            self.rejected += opened.reason is not RejectionReason.REPEATED
             return False, None
         if not isinstance(opened, Accepted):
             return True, None

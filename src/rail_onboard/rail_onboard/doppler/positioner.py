@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rail_signals.doppler.receiver import ToneReceiver
-from rail_signals.doppler.solver import Answer, DopplerSolver, Prior, Reason
+from rail_signals.doppler.solver import Answer, DopplerSolver, NoFixReason, Prior
 
 
 @dataclass(frozen=True)
@@ -88,21 +88,21 @@ class DopplerPositioner:
             self._offset = Prior(self._offset.mean, spread)
         self.tones = 0
         if block is None:
-            return Answer(Reason.TOO_FEW_STATIONS)
-        found = self._receiver.estimate(block)
-        self.tones = len(found)
-        stations = self._solver.stations_of(found.slots, self._near_m)
+            return Answer(NoFixReason.TOO_FEW_STATIONS)
+        shifts = self._receiver.estimate(block)
+        self.tones = len(shifts)
+        stations = self._solver.stations_of(shifts.slots, self._near_m)
         known = stations >= 0
         answer = self._solver.solve(
             stations[known],
-            found.shift_hz[known],
-            found.variance_hz2[known] + tracking.station_hz**2,
+            shifts.shift_hz[known],
+            shifts.variance_hz2[known] + tracking.station_hz**2,
             window_m=(self._near_m - self._half_m, self._near_m + self._half_m),
             direction=self._direction,
             offset=self._offset,
         )
         fix = answer.fix
-        if answer.reason is Reason.NONE and fix is not None:
+        if answer.reason is NoFixReason.NONE and fix is not None:
             self._near_m = fix.chainage_m
             self._half_m = tracking.placed_m + 6.0 * fix.sigma_m
             self._offset = Prior(fix.offset_hz, float(np.sqrt(fix.covariance[2, 2])))

@@ -21,7 +21,7 @@ from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import DOPPLER_FIX, DOPPLER_POSITION, REFERENCE_RX
 from rail_msgs_py.waveform import Waveform, silent_stamp_ns
 from rail_signals.doppler.receiver import ToneReceiver
-from rail_signals.doppler.solver import Answer, DopplerSolver, Reason
+from rail_signals.doppler.solver import Answer, DopplerSolver, NoFixReason
 from rail_signals.doppler.surveyed_line import SurveyedLine
 
 from .positioner import DopplerPositioner, Tracking
@@ -106,21 +106,21 @@ class DopplerPositionerNode(
         step_s = 0.0 if self._last_ns is None else (stamp_ns - self._last_ns) / NANOSECONDS
         self._last_ns = stamp_ns
         positioner = self._positioner
-        answer = Answer(Reason.TOO_FEW_STATIONS)
+        answer = Answer(NoFixReason.TOO_FEW_STATIONS)
         if self.switched_on:
             answer = positioner.locate(None if block is None else block.row, step_s)
         self._publish(stamp_ns, answer, positioner.tones)
 
     def _publish(self, stamp_ns: int, answer: Answer, tones: int) -> None:
-        fix = answer.fix if answer.reason is Reason.NONE else None
+        fix = answer.fix if answer.reason is NoFixReason.NONE else None
         place = Position(
             stamp_ns, self.place, self._p.track, self._positioner.near_m, inf, 0.0, inf
         )
-        figures = [float(answer.reason), *(np.nan,) * 5, float(tones), np.nan]
+        values = [float(answer.reason), *(np.nan,) * 5, float(tones), np.nan]
         if fix is not None:
             c = fix.covariance
-            figures[1:6] = fix.chainage_m, fix.speed_mps, c[0, 0], c[0, 1], c[1, 1]
-            figures[7] = fix.offset_hz
+            values[1:6] = fix.chainage_m, fix.speed_mps, c[0, 0], c[0, 1], c[1, 1]
+            values[7] = fix.offset_hz
             place = Position(
                 stamp_ns,
                 self.place,
@@ -130,7 +130,7 @@ class DopplerPositionerNode(
                 fix.speed_mps,
                 float(c[1, 1]),
             )
-        self._fix(stamp_ns, np.array([figures]))
+        self._fix(stamp_ns, np.array([values]))
         self._position(self._writer.write(place))
         trouble = "" if fix is not None else answer.reason.name.lower().replace("_", " ")
         level = DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK

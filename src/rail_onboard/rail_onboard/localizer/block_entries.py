@@ -44,9 +44,9 @@ class BlockEntries:
         Two joints that fit say nothing: a wrong one would be worse. No carrier, and one that is not
         a number, breaks the comparison: the next one may be that of the same block.
         """
-        heard = isfinite(carrier_hz) and carrier_hz > 0.0
-        before, self._carrier_hz = self._carrier_hz, carrier_hz if heard else 0.0
-        if not heard or carrier_hz == before or before == 0.0:
+        received = isfinite(carrier_hz) and carrier_hz > 0.0
+        before, self._carrier_hz = self._carrier_hz, carrier_hz if received else 0.0
+        if not received or carrier_hz == before or before == 0.0:
             return None
         if not isfinite(believed_m):
             return None

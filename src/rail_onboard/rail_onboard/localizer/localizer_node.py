@@ -1,7 +1,7 @@
 """One position on board from all sensors, with an interval that holds it.
 
 Topics in, as far as there are any: ``/<train>/odometer``, ``/<train>/doppler/fix``,
-``/<train>/atp/told_position`` of the tick before or the zone controller's ``position``,
+``/<train>/atp/relayed_range`` of the tick before or the zone controller's ``position``,
 ``/<train>/track_code/message``. Topics out: ``state``, ``position``.
 """
 
@@ -19,8 +19,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rail_msgs_py.decoders import table_row
 from rail_msgs_py.localizer import quantities
 from rail_msgs_py.parameters import parameter
-from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.position import figures_from_cdr as position_from_cdr
+from rail_msgs_py.position import Position, PositionWriter, position_from_cdr
 from rail_msgs_py.quantities import (
     CLAIM_SIGMAS,
     DIRECTION,
@@ -33,20 +32,20 @@ from rail_msgs_py.quantities import (
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
-from rail_msgs_py.topics.localizer import LOCALIZER_POSITION, LOCALIZER_STATE, TOLD_POSITION
+from rail_msgs_py.topics.localizer import LOCALIZER_POSITION, LOCALIZER_STATE, RELAYED_RANGE
 from rail_msgs_py.topics.ranging import POSITION
 from rail_msgs_py.topics.track_code import CODE_RECEIVED
 from rail_msgs_py.topics.world import ODOMETER
 from rail_signals.localizer.localizer import Localizer
-from rail_signals.localizer.protection_level import Localization, Reason, Status
+from rail_signals.localizer.protection_level import Localization, ProtectionReason, Status
 from rail_signals.localizer.readings import (
     BlockEntry,
     DopplerFix,
     RangeFix,
-    TickReadings,
+    TickMeasurements,
     WheelSpeed,
 )
-from rail_signals.localizer.screening import Rejected
+from rail_signals.localizer.screening import UnusedReading
 from rail_signals.localizer.settings import (
     BlockModel,
     DopplerModel,
@@ -68,7 +67,7 @@ class LocalizerParameters:
     start_m: float = TRAIN_START.parameter()
     placed_m: float = PLACED_SIGMA.parameter()
     doppler: bool = parameter(False, "whether there is a positioner by Doppler shifts")
-    told: bool = parameter(False, "whether ranges are told to the train protection by radio")
+    told: bool = parameter(False, "whether ranges are relayed to the train protection by radio")
     ranged: bool = parameter(False, "whether the zone controller's ranges are shared")
     joints_m: tuple[float, ...] = parameter((), "chainages of the joints it passes", unit="m")
     joint_carriers_hz: tuple[float, ...] = parameter(
@@ -125,8 +124,8 @@ class LocalizerNode(EquipmentNode[LocalizerParameters], name="localizer", namesp
         if p.told:
             # What is relayed in the first tick nobody can have received before it.
             late_ns = round(p.tick_s * NANOSECONDS)
-            row = table_row(TOLD_POSITION)
-            self._relayed = self.inputs.port(TOLD_POSITION, row, delay_ns=late_ns, train=train)
+            row = table_row(RELAYED_RANGE)
+            self._relayed = self.inputs.port(RELAYED_RANGE, row, delay_ns=late_ns, train=train)
         if p.ranged:
             self._ranged = self.inputs.port(POSITION, self._on_own_track, train=train)
         if p.joints_m:
@@ -187,8 +186,8 @@ class LocalizerNode(EquipmentNode[LocalizerParameters], name="localizer", namesp
         )
         self._position(self._writer.write(place))
 
-    def _readings(self, stamp_ns: int, items: Mapping[str, Any]) -> TickReadings:
-        return TickReadings(
+    def _readings(self, stamp_ns: int, items: Mapping[str, Any]) -> TickMeasurements:
+        return TickMeasurements(
             range=self._range_of(stamp_ns, items),
             doppler=_doppler_of(items.get(self._doppler)),
             block=self._block_of(items.get(self._codes)),
@@ -243,7 +242,7 @@ def _columns(here: Localization) -> tuple[float, ...]:
     return (
         float(here.status),
         float(here.reason),
-        float(here.found),
+        float(here.detected),
         float(sum(1 << sensor for sensor in here.excluded)),
         here.position_m,
         here.low_m,
@@ -261,14 +260,14 @@ def _trouble(here: Localization) -> str:
     parts = [f"without {', '.join(excluded)}"] if excluded else []
     if here.status is Status.UNAVAILABLE:
         parts.append("not known")
-        if here.reason is not Reason.NONE:
+        if here.reason is not ProtectionReason.NONE:
             parts.append(here.reason.name.lower().replace("_", " "))
-    elif here.found and not excluded:
+    elif here.detected and not excluded:
         parts.append("a sensor is faulty")
     return ": ".join(parts)
 
 
-def _words(rejected: Sequence[Rejected]) -> str:
+def _words(rejected: Sequence[UnusedReading]) -> str:
     """Which sensors gave no evidence, and why."""
     return "; ".join(f"{sensor.name.lower()}: {why.value}" for sensor, why, _ in rejected)
 

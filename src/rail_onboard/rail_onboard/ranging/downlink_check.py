@@ -25,11 +25,11 @@ class DownlinkCheck:
     Examples
     --------
     >>> check = DownlinkCheck(1e-10, 960)
-    >>> check.disturbance(amplitude=1e-4, snr=100.0, misfit=1.0)
+    >>> check.disturbance(amplitude=1e-4, snr=100.0, reduced chi-square=1.0)
     ''
-    >>> check.disturbance(amplitude=1e-4, snr=100.0, misfit=90.0)
+    >>> check.disturbance(amplitude=1e-4, snr=100.0, reduced chi-square=90.0)
     'hears more than one station'
-    >>> check.disturbance(amplitude=1e-4, snr=1.0, misfit=1.0)
+    >>> check.disturbance(amplitude=1e-4, snr=1.0, reduced chi-square=1.0)
     'channel jammed'
     """
 
@@ -37,18 +37,18 @@ class DownlinkCheck:
         self._jamming_mw = noise_mw * 10.0 ** (JAMMING_LIMIT_DB / 10.0)
         self._samples = samples
 
-    def disturbance(self, *, amplitude: float, snr: float, misfit: float) -> str:
+    def disturbance(self, *, amplitude: float, snr: float, reduced_chi_square: float) -> str:
         """Return the reason not to return the tone of a burst, empty if it may be.
 
         Parameters
         ----------
-        amplitude, snr, misfit : float
+        amplitude, snr, reduced_chi_square : float
             As in `rail_signals.ranging.receiver.ToneEstimate`.
         """
         if not (snr > 0.0 and math.isfinite(amplitude)):
             return "cannot read the tone"
         if amplitude**2 / snr > self._jamming_mw:
             return "channel jammed"
-        if second_signal(misfit, snr, self._samples):
+        if second_signal(reduced_chi_square, snr, self._samples):
             return "hears more than one station"
         return ""

@@ -21,7 +21,7 @@ from rail_msgs_py.table import TableWriter
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.ranging import VRS_CHANNEL, VRS_RX, VRS_TX
 from rail_msgs_py.waveform import Waveform, silence
-from rail_signals.ranging.receiver import LineReceiver, ToneEstimate
+from rail_signals.ranging.receiver import FmToneReceiver, ToneEstimate
 from rail_signals.ranging.signal import modulate
 from rail_signals.ranging.transponder import reply_lag_rad
 
@@ -39,7 +39,11 @@ class VrsParameters(SignalParameters):
     power_dbm: float = quantities.VRS_POWER.parameter()
     transponder_delay_s: float = quantities.UNIT_DELAY.parameter()
     delay_trim_s: float = parameter(
-        0.0, "added on the bench to bring it to that of the fleet", unit="s", low=-1e-3, high=1e-3
+        0.0,
+        "added on the calibration rig to bring it to that of the fleet",
+        unit="s",
+        low=-1e-3,
+        high=1e-3,
     )
     noise_dbm: float = quantities.RECEIVER_NOISE.parameter()
 
@@ -57,7 +61,7 @@ class VrsNode(EquipmentNode[VrsParameters], name="vrs", namespace="/train_1"):
                 "channel and its carrier"
             )
         self._signal = signal_of(p)
-        self._receiver = LineReceiver(self._signal)
+        self._receiver = FmToneReceiver(self._signal)
         self._check = DownlinkCheck(10.0 ** (p.noise_dbm / 10.0), self._signal.samples)
         self._carriers_hz = dict(zip(p.uplink_channels, p.uplink_carriers_hz, strict=True))
         self._amplitude = 10.0 ** (p.power_dbm / 20.0)
@@ -70,7 +74,7 @@ class VrsNode(EquipmentNode[VrsParameters], name="vrs", namespace="/train_1"):
         self._channel = self.publisher(VRS_CHANNEL, train=train).publish
         columns = ("downlink", "uplink", *(f"level_{channel}_dbm" for channel in channels))
         self._channel_table = TableWriter((train,), columns)
-        self._figures = np.zeros((1, len(columns)))
+        self._values = np.zeros((1, len(columns)))
 
     def start_over(self) -> None:
         """Have no channel in force."""
@@ -104,7 +108,7 @@ class VrsNode(EquipmentNode[VrsParameters], name="vrs", namespace="/train_1"):
             disturbance = self._check.disturbance(
                 amplitude=float(estimates.amplitude[row]),
                 snr=float(estimates.snr[row]),
-                misfit=float(estimates.misfit[row]),
+                reduced_chi_square=float(estimates.reduced_chi_square[row]),
             )
             if not disturbance:
                 reply = self._reply(stamp_ns, estimates, row)
@@ -126,11 +130,11 @@ class VrsNode(EquipmentNode[VrsParameters], name="vrs", namespace="/train_1"):
         return silence(stamp_ns, *radio).to_cdr()
 
     def _publish_channel(self, stamp_ns: int, levels: Mapping[int, float]) -> None:
-        self._figures[0, 0] = self._selector.downlink or 0
-        self._figures[0, 1] = self._selector.uplink or 0
+        self._values[0, 0] = self._selector.downlink or 0
+        self._values[0, 1] = self._selector.uplink or 0
         for column, channel in enumerate(self._p.downlink_channels, start=2):
-            self._figures[0, column] = levels.get(channel, -np.inf)
-        self._channel(self._channel_table.write(stamp_ns, self._figures))
+            self._values[0, column] = levels.get(channel, -np.inf)
+        self._channel(self._channel_table.write(stamp_ns, self._values))
 
     def _report(self, stamp_ns: int, disturbance: str) -> None:
         if not disturbance or not self.switched_on:

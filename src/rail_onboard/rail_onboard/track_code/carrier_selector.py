@@ -49,8 +49,8 @@ class CarrierSelector:
 
     def update(self, samples: NDArray[np.float64]) -> float | None:
         """Carrier in force after a block of real samples, None if there is none."""
-        found = band_levels_db(samples, self._carriers_hz, self._rate_hz)
-        levels = dict(zip(self._carriers_hz, found, strict=True))
+        levels_db = band_levels_db(samples, self._carriers_hz, self._rate_hz)
+        levels = dict(zip(self._carriers_hz, levels_db, strict=True))
         best_hz = max(levels, key=lambda carrier_hz: (levels[carrier_hz], -carrier_hz))
         in_force_db = levels.get(self._carrier_hz or 0.0, -math.inf)
         if levels[best_hz] <= self._least_db:

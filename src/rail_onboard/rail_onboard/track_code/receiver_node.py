@@ -17,7 +17,7 @@ from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_RX
 from rail_msgs_py.track_code import quantities
 from rail_msgs_py.waveform import Waveform
 from rail_signals.track_code.profile import load_profile, profile_names
-from rail_signals.track_code.receiver import FastTrackCodeReceiver
+from rail_signals.track_code.receiver import TrackCodeReceiver
 from rail_signals.track_code.word import as_number
 
 from .carrier_selector import CarrierSelector
@@ -46,37 +46,37 @@ class TrackCodeReceiverNode(
         """Open the ports of the train."""
         name, train = self._p.profile, self.place
         if name not in profile_names():
-            raise ParameterError(f"profile: {name}: is none of {', '.join(profile_names())}")
+            raise ParameterError(f"profile: {name}: is not one of {', '.join(profile_names())}")
         self._profile = load_profile(name)
         self._publish = self.table_out(CODE_RECEIVED, (train,), train=train)
-        self._figures = np.zeros((1, len(CODE_RECEIVED.columns)))
+        self._values = np.zeros((1, len(CODE_RECEIVED.columns)))
         self.stream_in(CODE_RX, self._on_block, train=train)
 
     def start_over(self) -> None:
         """Have received nothing on any carrier."""
         p = self._p
         self._receivers = {
-            carrier_hz: FastTrackCodeReceiver(self._profile, carrier_hz, p.sample_rate_hz)
+            carrier_hz: TrackCodeReceiver(self._profile, carrier_hz, p.sample_rate_hz)
             for carrier_hz in p.carriers_hz
         }
         self._selector = CarrierSelector(p.carriers_hz, p.sample_rate_hz, p.least_level_db)
 
     def _on_block(self, raw: bytes) -> None:
         block = Waveform.from_cdr(raw)
-        figures = self._figures[0]
-        figures[:] = 0.0
+        values = self._values[0]
+        values[:] = 0.0
         if self.switched_on and not block.silent:
             samples = np.ascontiguousarray(block.row.real)
             carrier_hz = self._selector.update(samples)
             decisions = {
                 each_hz: receiver.feed(samples) for each_hz, receiver in self._receivers.items()
             }
-            figures[-1] = self._selector.level_db
+            values[-1] = self._selector.level_db
             if carrier_hz is not None:
-                figures[0] = carrier_hz
-                self._show(decisions[carrier_hz], figures)
-        self._publish(block.stamp_ns, self._figures)
-        received = bool(figures[0])
+                values[0] = carrier_hz
+                self._show(decisions[carrier_hz], values)
+        self._publish(block.stamp_ns, self._values)
+        received = bool(values[0])
         self.report(
             DiagnosticStatus.OK if received else DiagnosticStatus.WARN,
             "pick-up",
@@ -84,14 +84,14 @@ class TrackCodeReceiverNode(
             stamp_ns=block.stamp_ns,
         )
 
-    def _show(self, decisions: list[Any], figures: np.ndarray[Any, Any]) -> None:
+    def _show(self, decisions: list[Any], values: np.ndarray[Any, Any]) -> None:
         """The last decision of the tick, if it is valid."""
         if not decisions or not decisions[-1].valid:
             return
         last = decisions[-1]
-        figures[1] = 1.0
-        figures[2] = as_number(last.bits)
-        figures[3:7] = [last.fields[field] for field in _FIELDS]
+        values[1] = 1.0
+        values[2] = as_number(last.bits)
+        values[3:7] = [last.fields[field] for field in _FIELDS]
 
 
 if __name__ == "__main__":

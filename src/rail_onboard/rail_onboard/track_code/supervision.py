@@ -126,13 +126,13 @@ class SupervisionOutput:
 
 
 @dataclass(frozen=True)
-class _Place:
-    """A place by the odometer [m], and the least and the most of the way by a localizer [m]."""
+class _OdometerPlace:
+    """A place by the odometer [m], and the interval of a localizer, least and most [m]."""
 
     odometer_m: float
     located_m: tuple[float, float] | None
 
-    def run_m(self, start: _Place, odometer_error: float) -> float:
+    def run_m(self, start: _OdometerPlace, odometer_error: float) -> float:
         """The most that the train can have run since a place."""
         if self.located_m is not None and start.located_m is not None:
             return max(0.0, self.located_m[1] - start.located_m[0])
@@ -144,8 +144,8 @@ class CodeSupervision:
 
     Parameters
     ----------
-    braking_mps2 : float
-        Service braking on level track that may be counted on.
+    guaranteed_service_mps2 : float
+        Guaranteed service brake rate on level track.
     odometer_error : float
         Relative error of distances that must be allowed for.
     scales : CodeScales
@@ -171,17 +171,17 @@ class CodeSupervision:
     def __init__(
         self,
         *,
-        braking_mps2: float = 0.5,
+        guaranteed_service_mps2: float = 0.5,
         odometer_error: float = 0.02,
         scales: CodeScales | None = None,
         thresholds: Thresholds | None = None,
         delays: Delays | None = None,
     ) -> None:
-        if not 0.0 < braking_mps2 < inf:
-            raise ValueError(f"braking_mps2: {braking_mps2} is not above zero")
+        if not 0.0 < guaranteed_service_mps2 < inf:
+            raise ValueError(f"braking_mps2: {guaranteed_service_mps2} is not above zero")
         if not 0.0 <= odometer_error < 1.0:
             raise ValueError(f"odometer_error: {odometer_error} is not from 0 to 1")
-        self._braking_mps2, self._odometer_error = braking_mps2, odometer_error
+        self._braking_mps2, self._odometer_error = guaranteed_service_mps2, odometer_error
         self._scales = scales or CodeScales()
         self._thresholds = thresholds or Thresholds()
         self._delays = delays or Delays()
@@ -194,8 +194,10 @@ class CodeSupervision:
         self._code_s = -inf  # when it was last valid, or its successor was due
         self._carrier_hz: float | None = None
         self._awaiting = False  # in a new block, without its code
-        self._entry: _Place | None = None  # the entrance of the block; None = unknown
-        self._before: deque[tuple[float, _Place]] = deque()  # times and places, carrier in force
+        self._entry: _OdometerPlace | None = None  # the entrance of the block; None = unknown
+        self._before: deque[tuple[float, _OdometerPlace]] = (
+            deque()
+        )  # times and places, carrier in force
         self._lost: tuple[float, float] | None = None  # time and speed when the code was lost
         self._service = True
         self._emergency = False
@@ -225,7 +227,8 @@ class CodeSupervision:
         carrier_hz : float, optional
             Carrier in force in the rails, None = none is heard [Hz].
         located_m : (float, float), optional
-            Least and most of the way by a localizer, of any origin; it grows with the travel [m].
+            Least and most of the distance by a localizer, of any origin; it grows with the travel
+            [m].
         fastest_mps : float, optional
             The fastest that the train may run, by a localizer; `speed_mps` is then the speed that
             is believed, and only tells whether it stands.
@@ -238,7 +241,7 @@ class CodeSupervision:
             return SupervisionOutput(0.0, True, True, True, "no odometer")
         speed_mps = abs(speed_mps)
         fastest = speed_mps if fastest_mps is None else fastest_mps
-        place = _Place(distance_m, located_m)
+        place = _OdometerPlace(distance_m, located_m)
         self._follow(time_s, place, speed_mps, carrier_hz)
         if fields is not None and carrier_hz is not None:
             self._take(time_s, self._scales.read(fields))
@@ -253,7 +256,7 @@ class CodeSupervision:
         return self._judge(fastest, speed_mps <= STANDSTILL_MPS, permitted_mps, lost=lost)
 
     def _follow(
-        self, time_s: float, place: _Place, speed_mps: float, carrier_hz: float | None
+        self, time_s: float, place: _OdometerPlace, speed_mps: float, carrier_hz: float | None
     ) -> None:
         """Notice the entrance of a block by its carrier."""
         if carrier_hz is None:
@@ -267,7 +270,7 @@ class CodeSupervision:
                 self._passed_stop |= speed_mps > STANDSTILL_MPS
             self._entry = entry if believed else None
             if not (self._awaiting or self._overdue(time_s)):
-                # The new code is given its time once: flicker must not put it off for ever.
+                # The new code is given its time once: flicker must not put it off indefinitely.
                 self._code_s = time_s
             self._awaiting = True
             self._before.clear()
@@ -290,14 +293,14 @@ class CodeSupervision:
         # The response time itself is within it, however the ticks are rounded.
         return self._code is None or time_s - self._code_s > self._delays.response_s + 1e-9
 
-    def _left_m(self, place: _Place) -> float:
+    def _left_m(self, place: _OdometerPlace) -> float:
         """What is left of the block at the worst; nothing where its entrance is not known."""
         if self._code is None or self._entry is None:
             return 0.0
         run_m = place.run_m(self._entry, self._odometer_error)
         return max(0.0, self._code.length_m - run_m)
 
-    def _permitted_mps(self, place: _Place) -> float:
+    def _permitted_mps(self, place: _OdometerPlace) -> float:
         """Speed permitted by the code at a place of its block; no bound if there was none."""
         code = self._code
         if code is None:

@@ -20,7 +20,7 @@ from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.track_code import CODE_RECEIVED
 from rail_msgs_py.topics.world import COMMAND, ODOMETER
 from rail_msgs_py.track_code import quantities
-from rail_onboard.localizer.located import located
+from rail_onboard.localizer.protected_interval import protected_interval
 
 from .supervision import CodeSupervision
 
@@ -62,7 +62,7 @@ class CodeSupervisionNode(
     def start_over(self) -> None:
         """Have received no code."""
         self._supervision = CodeSupervision(
-            braking_mps2=self._p.braking_mps2, odometer_error=self._p.odometer_error
+            guaranteed_service_mps2=self._p.braking_mps2, odometer_error=self._p.odometer_error
         )
 
     def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
@@ -74,10 +74,10 @@ class CodeSupervisionNode(
             if code[CODE_RECEIVED.index["valid"]] > 0.0:
                 fields = {name: round(code[CODE_RECEIVED.index[name]]) for name in _FIELDS}
         distance_m, speed_mps = items[self._odometer]
-        way_m, fastest_mps, doubt_mps = None, None, 0.0
-        known = located(items.get(self._localizer))
+        travelled_m, fastest_mps, doubt_mps = None, None, 0.0
+        known = protected_interval(items.get(self._localizer))
         if known is not None:
-            way_m = known.travelled(self._p.direction)
+            travelled_m = known.travelled(self._p.direction)
             speed_mps = known.believed_mps
             fastest_mps, doubt_mps = known.fastest_mps, known.doubt_mps
         output = self._supervision.update(
@@ -86,18 +86,18 @@ class CodeSupervisionNode(
             speed_mps,
             fields=fields,
             carrier_hz=carrier_hz,
-            located_m=way_m,
+            located_m=travelled_m,
             fastest_mps=fastest_mps,
         )
         emergency = output.emergency_brake or not self.switched_on
-        figures = [
+        values = [
             # The driver keeps to it by his own speed, supervision judges the fastest it may be.
             max(0.0, output.permitted_mps - doubt_mps),
             float(output.warning),
             float(output.service_brake),
             float(emergency),
         ]
-        self._command(stamp_ns, np.array([figures]))
+        self._command(stamp_ns, np.array([values]))
         intervenes = emergency or output.service_brake
         self.report(
             DiagnosticStatus.WARN if intervenes else DiagnosticStatus.OK,

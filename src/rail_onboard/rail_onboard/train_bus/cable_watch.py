@@ -28,13 +28,13 @@ from rail_signals.train_bus.tdr.reflectometer import Reflectogram
 from rail_signals.train_bus.tdr.traces import TraceSummary, summarise
 
 _SAME_SIGMAS: Final = 5.0
-#: Noise that has risen by this share makes an interpretation worth while.
+#: Noise that has risen by this fraction makes an interpretation worth while.
 _NOISIER: Final = 0.15
 _MOST_KEPT: Final = 64
 _GROWTH_POINTS: Final = 8
 
 
-class Reading(Protocol):
+class TraceReading(Protocol):
     """What an interpretation says, as far as it matters here."""
 
     @property
@@ -57,7 +57,7 @@ class Seen:
     kind, car, place_m, place_std_m
         As of `Finding`.
     size
-        As of `bus_fault_words.size_of`; NaN where there is none.
+        As of `rail_signals.train_bus.fault_words.size_of`; NaN where there is none.
     is_explained
         Whether it explains the traces.
     """
@@ -85,12 +85,12 @@ class BusWatch:
         Makes out what a reflectogram says.
     """
 
-    def __init__(self, interpret: Callable[[Reflectogram], Reading]) -> None:
+    def __init__(self, interpret: Callable[[Reflectogram], TraceReading]) -> None:
         self._interpret = interpret
         self._reference: TraceSummary | None = None
         self.measurements = self.interpretations = 0
         self.held: Seen | None = None
-        self.reading: Reading | None = None
+        self.reading: TraceReading | None = None
         self.trend: list[Seen] = []
         #: Whether the last measurement contradicted what is held: another should follow at once.
         self.is_in_doubt = False
@@ -148,7 +148,7 @@ class BusWatch:
             del self.trend[:-_MOST_KEPT]
 
 
-def _seen(time_s: float, reading: Reading) -> Seen | None:
+def _seen(time_s: float, reading: TraceReading) -> Seen | None:
     """What a reading has found."""
     finding = reading.finding
     if finding is None:

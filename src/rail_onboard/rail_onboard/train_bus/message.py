@@ -32,7 +32,7 @@ PATTERN: Final = bytes.fromhex("fe041851e459d4fa1c49b5bd8d2ee655")
 
 _FIXED = struct.Struct("<BBIIIH")
 _ENDS: Final = {"head": 1, "tail": 2}
-_HEARD = 1
+_HAS_RECEIVED = 1
 _PATTERN_BITS = np.unpackbits(np.frombuffer(PATTERN, dtype=np.uint8)).astype(np.bool_)
 
 
@@ -46,7 +46,7 @@ class BusMessage:
         Who speaks.
     tick
         When.
-    heard
+    received_tick
         Tick of the newest message of the other end that came through, None if none did.
     lost
         Messages of the other end that did not come through so far.
@@ -54,14 +54,14 @@ class BusMessage:
 
     end: End
     tick: int
-    heard: int | None
+    received_tick: int | None
     lost: int
 
     def to_bytes(self) -> bytes:
         """Payload of a frame."""
-        heard = NONE if self.heard is None else self.heard
-        flags = 0 if self.heard is None else _HEARD
-        fixed = _FIXED.pack(_ENDS[self.end], flags, self.tick % NONE, heard, self.lost % NONE, 0)
+        received = NONE if self.received_tick is None else self.received_tick
+        flags = 0 if self.received_tick is None else _HAS_RECEIVED
+        fixed = _FIXED.pack(_ENDS[self.end], flags, self.tick % NONE, received, self.lost % NONE, 0)
         return fixed + PATTERN
 
     @classmethod
@@ -71,15 +71,15 @@ class BusMessage:
         Raises
         ------
         ValueError
-            If it is none.
+            If it is not a message.
         """
         if len(payload) != PAYLOAD_BYTES or payload[_FIXED.size :] != PATTERN:
             raise ValueError(f"not a message of the bus: {payload.hex()}")
-        end, flags, tick, heard, lost, rest = _FIXED.unpack_from(payload)
+        end, flags, tick, received, lost, rest = _FIXED.unpack_from(payload)
         ends = {number: name for name, number in _ENDS.items()}
-        if end not in ends or flags != (heard != NONE) * _HEARD or rest or tick == NONE:
+        if end not in ends or flags != (received != NONE) * _HAS_RECEIVED or rest or tick == NONE:
             raise ValueError(f"not a message of the bus: {payload.hex()}")
-        return cls(ends[end], tick, None if heard == NONE else heard, lost)  # type: ignore[arg-type]
+        return cls(ends[end], tick, None if received == NONE else received, lost)  # type: ignore[arg-type]
 
 
 def pattern_errors(bits: NDArray[np.bool_]) -> tuple[int, int]:

@@ -35,7 +35,7 @@ from rail_signals.train_bus.tdr.reflectometer import Reflectogram, Reflectometer
 from rail_signals.train_bus.tdr.verdict import RunMeasurement, judge, judge_train
 from rail_signals.train_bus.train import train_consist, train_profiles
 
-from .cable_watch import BusWatch, Reading
+from .cable_watch import BusWatch, TraceReading
 
 _LEVELS = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
 
@@ -51,7 +51,7 @@ class TrainBusMonitorParameters:
     rise_time_s: float = quantities.REFLECTOMETER_RISE.parameter()
     noise_rms: float = quantities.REFLECTOMETER_NOISE.parameter()
     false_alarm_rate: float = parameter(
-        1e-6, "share of healthy measurements that may look faulty", low=1e-12, high=0.1
+        1e-6, "fraction of healthy measurements that may look faulty", low=1e-12, high=0.1
     )
     medium: str = parameter("/world/bus_medium", "full name of the node that carries the edges")
     tick_s: float = TICK.parameter()
@@ -77,7 +77,7 @@ class TrainBusMonitorNode(
             sample_period_s=p.rise_time_s / 4.0,
             noise_rms=p.noise_rms,
         )
-        samples = self._instrument.samples_for(self._consist.line().delay_s)
+        samples = self._instrument.samples_for(self._consist.bus_line().delay_s)
         self._time_s = self._instrument.grid(samples).time_s
         edge = step_edge(self._time_s, p.rise_time_s)
         self._edges = np.tile(edge, (p.traces, 1)).astype(np.complex128)
@@ -98,7 +98,7 @@ class TrainBusMonitorNode(
         self._watch_over = BusWatch(self._read)
         self._level = 0
 
-    def _read(self, traces: Reflectogram) -> Reading:
+    def _read(self, traces: Reflectogram) -> TraceReading:
         rate = self._p.false_alarm_rate
         return interpret(traces, self._consist, self._instrument, rate)
 
@@ -123,7 +123,7 @@ class TrainBusMonitorNode(
         block = Waveform.from_cdr(raw)
         if self.switched_on and not block.silent:
             self._understand(block.stamp_ns, np.ascontiguousarray(block.samples.real))
-        self._state(block.stamp_ns, self._figures())
+        self._state(block.stamp_ns, self._values())
         self._is_seen(block.stamp_ns, None)
 
     def _understand(self, stamp_ns: int, rows: NDArray[np.float64]) -> None:
@@ -149,7 +149,7 @@ class TrainBusMonitorNode(
             return
         verdicts = judge_train(reading, self._consist, self._profiles)
         rows = tuple(f"car_{number}" for number in range(1, len(verdicts) + 1))
-        values = [[*_figures_of(v.measurement), v.status == "pass"] for v in verdicts]
+        values = [[*_values_of(v.measurement), v.status == "pass"] for v in verdicts]
         table = Table(stamp_ns, rows, BUS_VERDICTS.columns, np.array(values, dtype=np.float64))
         self._verdicts.publish(table.to_msg())
         # A fault that can be measured is not yet one that the criteria forbid.
@@ -164,8 +164,8 @@ class TrainBusMonitorNode(
         text = "the bus is as drawn" if held is None else held.words()
         if failed:
             text += f"; {failed[0]}"
-        figures = [] if held is None else [("growth_per_s", f"{watch.growth_per_s():.3g}")]
-        self.report(_LEVELS[self._level], "bus cable", text, figures, stamp_ns=stamp_ns)
+        cells = [] if held is None else [("growth_per_s", f"{watch.growth_per_s():.3g}")]
+        self.report(_LEVELS[self._level], "bus cable", text, cells, stamp_ns=stamp_ns)
         if held is not None:
             self._publish_trend(stamp_ns)
 
@@ -179,7 +179,7 @@ class TrainBusMonitorNode(
         table = Table(stamp_ns, rows, BUS_TREND.columns, np.array(values, dtype=np.float64))
         self._trend.publish(table.to_msg())
 
-    def _figures(self) -> NDArray[np.float64]:
+    def _values(self) -> NDArray[np.float64]:
         """State as `BUS_STATE.columns`."""
         watch, held = self._watch_over, self._watch_over.held
         fault = (0.0, nan, nan, nan)
@@ -190,10 +190,10 @@ class TrainBusMonitorNode(
         return np.array([[*counts, *fault, watch.growth_per_s()]], dtype=np.float64)
 
 
-def _figures_of(measurement: RunMeasurement) -> tuple[float, float, float]:
+def _values_of(measurement: RunMeasurement) -> tuple[float, float, float]:
     """Length, impedance and attenuation, NaN where no wave came back from."""
-    figures = (measurement.length_m, measurement.impedance_ohm, measurement.attenuation_db)
-    length_m, impedance_ohm, attenuation_db = (nan if x is None else x for x in figures)
+    values = (measurement.length_m, measurement.impedance_ohm, measurement.attenuation_db)
+    length_m, impedance_ohm, attenuation_db = (nan if x is None else x for x in values)
     return length_m, impedance_ohm, attenuation_db
 
 

@@ -33,19 +33,19 @@ class BusTerminal:
         self.sent = self.received = self.lost = 0
         self._bits = self._bit_errors = 0
         self._ebn0_db = nan
-        self._heard: int | None = None
+        self._received_tick: int | None = None
         self._confirmed: int | None = None
         self._last_loss: int | None = None
 
     def payload(self, tick: int) -> bytes:
         """What to say in a tick."""
         self.sent += 1
-        return BusMessage(self._end, tick, self._heard, self.lost).to_bytes()
+        return BusMessage(self._end, tick, self._received_tick, self.lost).to_bytes()
 
     def take(self, tick: int, frame: ReceivedFrame) -> None:
         """Take what was received in a tick; what is no message of this tick is one lost."""
         self._ebn0_db = 10.0 * log10(frame.ebn0) if frame.ebn0 > 0.0 else nan
-        if frame.found:
+        if frame.detected:
             wrong, known = pattern_errors(frame.bits)
             self._bit_errors += wrong
             self._bits += known
@@ -55,9 +55,9 @@ class BusTerminal:
             self._last_loss = tick
             return
         self.received += 1
-        self._heard = tick
+        self._received_tick = tick
         # The tail shows that it is there by speaking, and the head that it was heard.
-        self._confirmed = message.heard if self._end == "head" else tick
+        self._confirmed = message.received_tick if self._end == "head" else tick
 
     def age_s(self, tick: int) -> float:
         """How old the last word of the other end is [s]; infinite before the first."""
@@ -73,8 +73,8 @@ class BusTerminal:
             return False
         return (tick - self._last_loss) * self._tick_s <= self._timeout_s
 
-    def figures(self, tick: int) -> tuple[float, ...]:
-        """Figures as ``rail_msgs_py.topics.train_bus.BUS_LINK.columns``."""
+    def link_values(self, tick: int) -> tuple[float, ...]:
+        """Values as ``rail_msgs_py.topics.train_bus.BUS_LINK.columns``."""
         counts = (self.sent, self.received, self.lost, self._bits, self._bit_errors)
         return (
             *map(float, counts),

@@ -21,7 +21,7 @@ from rail_msgs_py.topics.train_bus import BUS_LINK, BUS_RX, BUS_TX
 from rail_msgs_py.train_bus import quantities
 from rail_msgs_py.waveform import Waveform, silence
 from rail_signals.train_bus.frame import BusFrameFormat
-from rail_signals.train_bus.receiver import NOT_FOUND, BusFrameReceiver
+from rail_signals.train_bus.receiver import NOT_DETECTED, BusFrameReceiver
 
 from .message import PAYLOAD_BYTES, End
 from .terminal import OTHER, BusTerminal
@@ -76,9 +76,9 @@ class BusTerminalNode(EquipmentNode[BusTerminalParameters], name="bus_head", nam
     def _take(self, stamp_ns: int, samples: NDArray[np.float64] | None) -> None:
         tick = stamp_ns // self._tick_ns
         if self.switched_on:
-            found = NOT_FOUND if samples is None else self._receiver.receive(samples)
-            self._terminal.take(tick, found)
-        self._link(stamp_ns, np.array([self._terminal.figures(tick)]))
+            frame = NOT_DETECTED if samples is None else self._receiver.receive(samples)
+            self._terminal.take(tick, frame)
+        self._link(stamp_ns, np.array([self._terminal.link_values(tick)]))
         self._report_link(stamp_ns, tick)
 
     def _report_link(self, stamp_ns: int, tick: int) -> None:
@@ -86,7 +86,7 @@ class BusTerminalNode(EquipmentNode[BusTerminalParameters], name="bus_head", nam
         if not (terminal.is_confirmed(tick) or terminal.lost or terminal.age_s(tick) < inf):
             level, text = DiagnosticStatus.OK, f"waits for the {self._other}"
         elif not terminal.is_confirmed(tick):
-            level, text = DiagnosticStatus.ERROR, f"the {self._other} is not heard"
+            level, text = DiagnosticStatus.ERROR, f"the {self._other} is not received"
         elif terminal.loses(tick):
             level, text = DiagnosticStatus.WARN, f"loses messages of the {self._other}"
         else:

@@ -1,7 +1,7 @@
 """Automatic train protection: obeys movement authorities received by radio, reports the train.
 
 Topics in: ``/<train>/cbtc_radio/telegrams``, ``/<train>/odometer``, with a localizer its
-``state``. Topics out: ``command``, ``telegrams``, ``state``, ``told_position``.
+``state``. Topics out: ``command``, ``telegrams``, ``state``, ``relayed_range``.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from rail_msgs_py.quantities import (
     TRAIN_START,
 )
 from rail_msgs_py.tick_node import EquipmentNode
-from rail_msgs_py.topics.localizer import LOCALIZER_STATE, TOLD_POSITION
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE, RELAYED_RANGE
 from rail_msgs_py.topics.train_radio import ATP_STATE, RADIO_TELEGRAMS, TRAIN_TELEGRAMS
 from rail_msgs_py.topics.world import COMMAND, ODOMETER
 from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
 from rail_msgs_py.train_radio.train_channel import train_end
 from rail_onboard.braking_curve import GuaranteedBraking
-from rail_onboard.localizer.located import located
+from rail_onboard.localizer.protected_interval import protected_interval
 from rail_onboard.track_code.supervision import SupervisionOutput, Thresholds
 
 from .supervision import AuthoritySupervision
 from .train_location import NOWHERE, Location, TrainLocation
 from .train_protection import TrainIdentity, TrainProtection
 
-_NOT_TOLD = (nan, nan, inf)
+_NOT_RELAYED = (nan, nan, inf)
 _OFF = SupervisionOutput(0.0, True, True, True, "switched off")
 
 
@@ -117,7 +117,7 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
         if self._p.localizer:
             row = table_row(LOCALIZER_STATE)
             self._localizer = self.inputs.port(LOCALIZER_STATE, row, train=train)
-            self._relay = self.table_out(TOLD_POSITION, (train,), awaited=True, train=train)
+            self._relay = self.table_out(RELAYED_RANGE, (train,), awaited=True, train=train)
         self._odometer = self.inputs.trigger(ODOMETER, table_row(ODOMETER), train=train)
         self._command = self.table_out(
             COMMAND, (train,), awaited=True, train=train, supervision=self.get_name()
@@ -139,7 +139,7 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
         protection = self._protection
         place, fastest_mps, doubt_mps = None, None, 0.0
         if self._p.localizer:
-            known = located(items.get(self._localizer))
+            known = protected_interval(items.get(self._localizer))
             place = NOWHERE
             if known is not None:
                 place = Location(known.low_m + known.half_m, known.half_m, True)
@@ -148,14 +148,16 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
         out, sent = _OFF, []
         if self.switched_on:
             out = protection.tick(stamp_ns, distance_m, speed_mps, frames, place, fastest_mps)
-            told_mps = speed_mps if fastest_mps is None else fastest_mps
-            sent = [(self._p.number, protection.frame(stamp_ns, told_mps))]
+            reported_mps = speed_mps if fastest_mps is None else fastest_mps
+            sent = [(self._p.number, protection.frame(stamp_ns, reported_mps))]
         self._send(telegrams(stamp_ns, sent))
         if self._p.localizer:
-            newest = max(protection.told, default=_NOT_TOLD) if self.switched_on else _NOT_TOLD
+            newest = (
+                max(protection.relayed, default=_NOT_RELAYED) if self.switched_on else _NOT_RELAYED
+            )
             self._relay(stamp_ns, np.array([newest]))
-        figures = np.array([protection.figures(stamp_ns)], dtype=np.float64)
-        self._state(stamp_ns, figures)
+        values = np.array([protection.state_values(stamp_ns)], dtype=np.float64)
+        self._state(stamp_ns, values)
         # The driver keeps to it by his own speed, supervision judges the fastest it may be.
         permitted_mps = max(0.0, out.permitted_mps - doubt_mps)
         command = [[permitted_mps, out.warning, out.service_brake, out.emergency_brake]]

@@ -81,7 +81,7 @@ class CbtcRadioNode(EquipmentNode[CbtcRadioParameters], name="cbtc_radio", names
         self._send = self.stream_out(CBTC_TRAIN_TX, train=train)
         self._report_frames = self.stream_out(RADIO_TELEGRAMS, train=train)
         self._link = self.table_out(RADIO_LINK, (train,), train=train)
-        self._figures = np.zeros((1, len(RADIO_LINK.columns)))
+        self._values = np.zeros((1, len(RADIO_LINK.columns)))
 
     def start_over(self) -> None:
         """Have no base station."""
@@ -111,16 +111,16 @@ class CbtcRadioNode(EquipmentNode[CbtcRadioParameters], name="cbtc_radio", names
             # Of each channel the beacon and the train's own slot, by the antennas of the scheme.
             antennas = self._slots.burst.scheme.receive
             cut = np.stack([self._slots.cut(block[:antennas]) for block in received.values()])
-            found = self._receiver.receive(cut, doppler_hz=self._p.doppler_hz)
+            bursts = self._receiver.receive(cut, doppler_hz=self._p.doppler_hz)
             for row, number in enumerate(received):
-                if found.detected[row, 0]:
-                    beacons[number] = float(np.mean(found.snr[row, 0]))
-                if found.detected[row, 1]:
-                    frames.append((self._p.slot, frame_of(found.bits[row, 1])))
+                if bursts.detected[row, 0]:
+                    beacons[number] = float(np.mean(bursts.snr[row, 0]))
+                if bursts.detected[row, 1]:
+                    frames.append((self._p.slot, frame_of(bursts.bits[row, 1])))
         channel = self._selector.update(beacons)
         self._report_frames(telegrams(stamp_ns, frames))
-        self._figures[0] = channel or 0, beacons.get(channel or 0, 0.0), len(frames)
-        self._link(stamp_ns, self._figures)
+        self._values[0] = channel or 0, beacons.get(channel or 0, 0.0), len(frames)
+        self._link(stamp_ns, self._values)
         self.report(
             DiagnosticStatus.OK if beacons else DiagnosticStatus.WARN,
             "radio",

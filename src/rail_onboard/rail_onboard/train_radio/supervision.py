@@ -1,8 +1,8 @@
 """Supervision of a train by the movement authorities that it is told over the radio.
 
 All places are s, the chainage times the direction of travel. The front is at most at f, the end
-of the location's interval, and the rear at least at r, its begin less the length of the train. An
-authority reaches to E. With D the stopping way of ``braking_curve``, D_E that of the emergency
+of the location's interval, and the rear at least at r, its start less the length of the train. An
+authority reaches to E. With D the stopping distance of ``braking_curve``, D_E that of the emergency
 brake, and m the excess ``service_over_mps``, the permitted speed P is the least of
 
 - the limits in force from r to f;
@@ -49,7 +49,7 @@ _SAME_TIME_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Authority:
+class ReceivedAuthority:
     """A movement authority as its receiver holds it.
 
     Parameters
@@ -110,8 +110,8 @@ class AuthoritySupervision:
     Raises
     ------
     ValueError
-        If a parameter is out of range; of the margin too, if it is less than the stopping way of a
-        train that is ``service_over_mps`` too fast where it should stand.
+        If a parameter is out of range; of the margin too, if it is less than the stopping distance
+        of a train that is ``service_over_mps`` too fast where it should stand.
 
     Examples
     --------
@@ -119,7 +119,7 @@ class AuthoritySupervision:
     >>> here = Location(1000.0, 2.0, True)
     >>> supervision.update(0.0, here, 0.0).reason
     'no authority'
-    >>> authority = Authority(sealed_s=0.0, end_m=1500.0, limit_mps=30.0)
+    >>> authority = ReceivedAuthority(sealed_s=0.0, end_m=1500.0, limit_mps=30.0)
     >>> out = supervision.update(0.5, here, 0.0, authority=authority)
     >>> round(out.permitted_mps, 1), out.service_brake
     (24.3, False)
@@ -153,13 +153,13 @@ class AuthoritySupervision:
     def reset(self) -> None:
         """Forget everything, as when switched on: the train may not move."""
         self._time_s = -inf
-        self._authority: Authority | None = None
+        self._authority: ReceivedAuthority | None = None
         self._blind: tuple[float, float] | None = None  # time and speed when told to stop
         self._service = "no authority"  # why it brakes, empty = it does not
         self._emergency = ""
 
     @property
-    def authority(self) -> Authority | None:
+    def authority(self) -> ReceivedAuthority | None:
         """The authority in force, which may be void."""
         return self._authority
 
@@ -169,7 +169,7 @@ class AuthoritySupervision:
         location: Location,
         speed_mps: float,
         *,
-        authority: Authority | None = None,
+        authority: ReceivedAuthority | None = None,
         fastest_mps: float | None = None,
     ) -> SupervisionOutput:
         """One tick.
@@ -182,7 +182,7 @@ class AuthoritySupervision:
             Of the front, at this time.
         speed_mps : float
             Of the odometer, of either sign.
-        authority : Authority, optional
+        authority : ReceivedAuthority, optional
             The latest one received. One that is not newer than that in force, from the future, or
             whose steps are not in the order of travel, is ignored.
         fastest_mps : float, optional
@@ -211,7 +211,7 @@ class AuthoritySupervision:
             permitted_mps = min(permitted_mps, self._stopping_mps(time_s))
         return self._judge(fastest, speed_mps, permitted_mps, ahead_m, stop)
 
-    def _take(self, authority: Authority) -> None:
+    def _take(self, authority: ReceivedAuthority) -> None:
         places_m = [self._direction * at_m for at_m, _ in authority.steps]
         if authority.sealed_s > self._time_s + _SAME_TIME_S or places_m != sorted(places_m):
             return
@@ -230,7 +230,7 @@ class AuthoritySupervision:
         return "" if located else "position unknown"
 
     def _permitted(self, location: Location) -> tuple[float, float]:
-        """Speed permitted by the authority at a place, and the way to its end [m]."""
+        """Speed permitted by the authority at a place, and the distance to its end [m]."""
         if (authority := self._authority) is None:
             return inf, inf
         s = self._direction * location.position_m

@@ -9,12 +9,12 @@ from math import inf, nan
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.train_radio.movement_authority import MovementAuthority
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
-from rail_msgs_py.train_radio.safe_frame import Kind
+from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.train_channel import CountedChannel
 from rail_msgs_py.train_radio.train_report import FASTEST_MPS, WIDEST_M, LocationReport
 from rail_onboard.track_code.supervision import SupervisionOutput
 
-from .supervision import Authority, AuthoritySupervision
+from .supervision import AuthoritySupervision, ReceivedAuthority
 from .train_location import NOWHERE, Location, TrainLocation
 
 
@@ -61,7 +61,7 @@ class TrainProtection:
         self._placed = False
         self._here = NOWHERE
         #: Ranged positions told in the tick: when sealed [s], position, half-width [m].
-        self.told: list[tuple[float, float, float]] = []
+        self.relayed: list[tuple[float, float, float]] = []
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -89,12 +89,12 @@ class TrainProtection:
             Where a localizer says the front is, and the fastest that the train may run.
         """
         time_s = time_ns / NANOSECONDS
-        self.told = []
+        self.relayed = []
         self._location.update(time_s, distance_m, speed_mps)
         if not self._placed:
             train = self._identity
             self._placed = self._location.fix(time_s, train.start_m, train.placed_m)
-        newest: Authority | None = None
+        newest: ReceivedAuthority | None = None
         for frame in frames:
             authority = self._read(frame, time_ns)
             if authority is not None and (newest is None or authority.sealed_s > newest.sealed_s):
@@ -104,31 +104,31 @@ class TrainProtection:
             time_s, self._here, speed_mps, authority=newest, fastest_mps=fastest_mps
         )
 
-    def _read(self, frame: bytes, time_ns: int) -> Authority | None:
+    def _read(self, frame: bytes, time_ns: int) -> ReceivedAuthority | None:
         _, opened = self._channel.open(frame, time_ns)
         if opened is None:
             return None
         train = self._identity
         try:
-            told = MovementAuthority.from_bytes(opened.payload)
+            telegram = MovementAuthority.from_bytes(opened.payload)
         except ValueError:
             self._channel.refuse()
             return None
         mine = (train.number, train.segment, train.direction)
-        if (told.train, told.segment, told.direction) != mine:
+        if (telegram.train, telegram.segment, telegram.direction) != mine:
             self._channel.refuse()
             return None
         sealed_s = time_ns / NANOSECONDS - opened.age_s
-        if told.located is not None:
-            self._location.fix(sealed_s, *told.located)
-            self.told.append((sealed_s, *told.located))
-        return Authority(
+        if telegram.located is not None:
+            self._location.fix(sealed_s, *telegram.located)
+            self.relayed.append((sealed_s, *telegram.located))
+        return ReceivedAuthority(
             sealed_s,
-            told.end_of_authority_m,
-            told.limit_mps,
-            tuple((step.from_m, step.limit_mps) for step in told.steps),
-            told.validity_s,
-            told.emergency_stop,
+            telegram.end_of_authority_m,
+            telegram.limit_mps,
+            tuple((step.from_m, step.limit_mps) for step in telegram.steps),
+            telegram.validity_s,
+            telegram.emergency_stop,
         )
 
     def frame(self, time_ns: int, speed_mps: float) -> bytes:
@@ -146,10 +146,10 @@ class TrainProtection:
             True,
             valid,
         )
-        return self._channel.channel.seal(Kind.LOCATION_REPORT, report.to_bytes(), time_ns)
+        return self._channel.channel.seal(FrameKind.LOCATION_REPORT, report.to_bytes(), time_ns)
 
-    def figures(self, time_ns: int) -> tuple[float, ...]:
-        """Figures as ``ATP_STATE.columns``; NaN where there is none."""
+    def state_values(self, time_ns: int) -> tuple[float, ...]:
+        """Values as ``ATP_STATE.columns``; NaN where there is none."""
         time_s = time_ns / NANOSECONDS
         here, held = self._here, self._supervision.authority
         return (

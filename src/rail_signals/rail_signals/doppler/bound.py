@@ -12,8 +12,8 @@ from .surveyed_line import SurveyedLine
 from .tone_plan import TonePlan
 
 _DERIVATIVE_M = 0.5
-#: What is left of the information on the chainage below this share of it is rounding.
-_LEAST_SHARE = 1e-11
+#: What is left of the information on the chainage below this fraction of it is rounding.
+_LEAST_FRACTION = 1e-11
 
 
 def shift_variance_hz2(plan: TonePlan, snr: ArrayLike) -> FloatArray:
@@ -34,7 +34,7 @@ def shift_information(
     speed_mps: ArrayLike,
     variance_hz2: ArrayLike,
     *,
-    reach_m: float = np.inf,
+    coverage_range_m: float = np.inf,
 ) -> FloatArray:
     """Fisher information of a block on chainage, speed and offset [points, 3, 3].
 
@@ -43,18 +43,18 @@ def shift_information(
     places = np.asarray(chainage_m, dtype=np.float64)
     antennas = np.asarray(stations_m, dtype=np.float64)
     speed = np.broadcast_to(np.asarray(speed_mps, dtype=np.float64), places.shape)
-    way = speed * plan.averaging_time_s
+    run_m = speed * plan.averaging_time_s
 
     def mean_rate(at: FloatArray) -> FloatArray:
-        return 0.5 * (line.rates(antennas, at - way) + line.rates(antennas, at + way))
+        return 0.5 * (line.rates(antennas, at - run_m) + line.rates(antennas, at + run_m))
 
     per_mps = -plan.carrier_hz / SPEED_OF_LIGHT_M_PER_S
     rows = np.ones((*places.shape, antennas.shape[0], 3))
     bend = mean_rate(places + _DERIVATIVE_M) - mean_rate(places - _DERIVATIVE_M)
     rows[..., 0] = per_mps * speed[..., None] * bend / (2.0 * _DERIVATIVE_M)
     rows[..., 1] = per_mps * mean_rate(places)
-    heard = line.distances(antennas, places) <= reach_m
-    weight = np.where(heard, 1.0 / np.broadcast_to(variance_hz2, heard.shape), 0.0)
+    received = line.distances(antennas, places) <= coverage_range_m
+    weight = np.where(received, 1.0 / np.broadcast_to(variance_hz2, received.shape), 0.0)
     return np.asarray(np.einsum("...na,...n,...nb->...ab", rows, weight, rows))
 
 
@@ -66,7 +66,7 @@ def position_bound_m(
     speed_mps: ArrayLike,
     variance_hz2: ArrayLike,
     *,
-    reach_m: float = np.inf,
+    coverage_range_m: float = np.inf,
     offset_sigma_hz: float = np.inf,
     speed_sigma_mps: float = np.inf,
 ) -> FloatArray:
@@ -81,7 +81,7 @@ def position_bound_m(
     speed_mps : float, or [points]
     variance_hz2 : float, or [points, stations]
         Of the shifts [Hz^2].
-    reach_m : float
+    coverage_range_m : float
         Stations farther away are not heard [m].
     offset_sigma_hz, speed_sigma_mps : float
         How well the receiver's offset and the speed are known beforehand; 0 = exactly.
@@ -100,7 +100,13 @@ def position_bound_m(
     [49.7, 12.4]
     """
     information = shift_information(
-        plan, line, stations_m, chainage_m, speed_mps, variance_hz2, reach_m=reach_m
+        plan,
+        line,
+        stations_m,
+        chainage_m,
+        speed_mps,
+        variance_hz2,
+        coverage_range_m=coverage_range_m,
     )
     known = [0, *(i for i, s in ((1, speed_sigma_mps), (2, offset_sigma_hz)) if s > 0.0)]
     information = information[..., known, :][..., known]
@@ -122,7 +128,7 @@ def position_bound_m(
 
 def tracked_bound_m(
     information: FloatArray,
-    given: ArrayLike,
+    available: ArrayLike,
     *,
     offset_sigma_hz: float,
     walk_hz: float,
@@ -134,7 +140,7 @@ def tracked_bound_m(
     ----------
     information : float [blocks, 3, 3]
         Of `shift_information`, block after block.
-    given : bool [blocks]
+    available : bool [blocks]
         Whether the offset found with a block is carried on.
     offset_sigma_hz, speed_sigma_mps : float
         How well the receiver's offset is known at first, and the speed at any time.
@@ -143,14 +149,14 @@ def tracked_bound_m(
     """
     bound = np.empty(information.shape[0])
     variance = offset_sigma_hz**2
-    for block, (mine, carried) in enumerate(zip(information, np.asarray(given), strict=True)):
+    for block, (mine, carried) in enumerate(zip(information, np.asarray(available), strict=True)):
         total = mine.copy()
         total[1, 1] += speed_sigma_mps**-2
         total[2, 2] += 1.0 / variance
         # Speed and offset first: they always have information, the chainage may have none.
         rest = np.linalg.inv(total[1:, 1:])
         chainage = total[0, 0] - total[0, 1:] @ rest @ total[1:, 0]
-        certain = chainage > _LEAST_SHARE * total[0, 0]
+        certain = chainage > _LEAST_FRACTION * total[0, 0]
         bound[block] = chainage**-0.5 if certain else np.inf
         if carried and certain:
             gain = rest @ total[1:, 0]

@@ -15,8 +15,8 @@ count where the shifts are those of a train that runs forwards and no faster tha
 k the shift straight ahead of a station, ``f_dk = k cos(phi_k)`` and 0 < k <= `most_hz`.
 
 What the claims do not speak of holds here as there: the offset of the receiver must be known and
-taken off, two zeros may be left, and a train that stands has no place. `doppler_position` needs
-neither the cases nor these conditions.
+taken off, two zeros may be left, and a train that stands has no place.
+`rail_signals.doppler.solver` needs neither the cases nor these conditions.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ class MixedSection:
 
     def position(self, shifts_hz: Shifts, most_hz: float = inf) -> tuple[str, float] | None:
         """``("straight", x)`` in metres or ``("arc", theta)`` in radians; None if neither fits."""
-        found: list[tuple[float, str, float]] = []
+        minima: list[tuple[float, str, float]] = []
         for name, section, low, high in (
             ("straight", self.straight, self.straight.from_m, self.straight.to_m),
             ("arc", self.arc, self.arc.from_rad, self.arc.to_rad),
@@ -166,10 +166,10 @@ class MixedSection:
             place, value = section.position(shifts_hz, most_hz)
             margin = 1e-6 * (high - low)
             if low + margin < place < high - margin:
-                found.append((value, name, place))
-        if not found:
+                minima.append((value, name, place))
+        if not minima:
             return None
-        _, name, place = min(found)
+        _, name, place = min(minima)
         return name, place
 
 
@@ -192,7 +192,7 @@ def _least(
     grid = np.linspace(low, high, _GRID)
     values = section.function(grid, shifts_hz)
     inner = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
-    found: list[tuple[float, float]] = []
+    minima: list[tuple[float, float]] = []
     for index in inner.tolist():
         near = minimize_scalar(
             lambda at: float(section.function(at, shifts_hz)),
@@ -203,8 +203,8 @@ def _least(
         one, two = (float(c) for c in section.cosines(float(near.x)))
         ahead_hz = (shifts_hz[0] * one + shifts_hz[1] * two) / (one * one + two * two)
         if 0.0 < ahead_hz <= most_hz:
-            found.append((float(near.fun), float(near.x)))
-    if not found:
+            minima.append((float(near.fun), float(near.x)))
+    if not minima:
         return (low, float(values[0])) if values[0] < values[-1] else (high, float(values[-1]))
-    value, place = min(found)
+    value, place = min(minima)
     return place, value

@@ -24,10 +24,10 @@ RELIABLE_ENERGY = 40.0
 """Energy of a tone over noise, N gamma, from which it is reported (16 dB). Below, an estimate is
 now and then off by many standard deviations: one in 4000 at 14 dB."""
 
-#: Share of the samples at both ends of the range that tells an overloaded receiver.
-_CLIPPED_SHARE = 0.005
-#: Probability that noise alone makes the residual of a good tone count as a misfit.
-_MISFIT_FALSE_ALARM = 1e-7
+#: Fraction of the samples at both ends of the range that tells an overloaded receiver.
+_CLIPPED_FRACTION = 0.005
+#: Probability that noise alone makes the residual of a good tone exceed the limit of chi-square.
+_CHI_SQUARE_FALSE_ALARM = 1e-7
 #: Largest last step of a fit that has settled [rad].
 _SETTLED_RAD = 0.1
 #: What the model of a tone leaves at most of the strongest tone, in power, and how far below
@@ -44,14 +44,15 @@ class ToneShifts:
     slots : int [n]
         Slots in which a tone was found; the others are silent, too weak, or not to be trusted.
     shift_hz : float [n]
-        Shift of each tone from the middle of its slot, that of the whole block (`doppler_plan`).
+        Shift of each tone from the middle of its slot, that of the whole block
+        (`rail_signals.doppler.tone_plan`).
     variance_hz2 : float [n]
         Its variance: the bound at the estimated `snr`.
     snr : float [n]
         Signal-to-noise ratio per sample (linear).
     chirp_hz_per_s : float [n]
         Rate of the shift.
-    misfit : float [n]
+    reduced_chi_square : float [n]
         Power that the fit leaves near the tone, over that of the noise; about 1.
     """
 
@@ -60,7 +61,7 @@ class ToneShifts:
     variance_hz2: FloatArray
     snr: FloatArray
     chirp_hz_per_s: FloatArray
-    misfit: FloatArray
+    reduced_chi_square: FloatArray
 
     def __len__(self) -> int:
         return len(self.slots)
@@ -99,7 +100,7 @@ class ToneReceiver:
         self.least_snr = least_energy / plan.samples
         """Signal-to-noise ratio per sample from which a tone is reported."""
         freedom = 2 * (PIECES - PHASE_TERMS)
-        self._most_misfit = float(chdtri(freedom, _MISFIT_FALSE_ALARM)) / freedom
+        self._most_chi_square = float(chdtri(freedom, _CHI_SQUARE_FALSE_ALARM)) / freedom
         rate_hz = plan.sample_rate_hz
         self._unit_variance = float(
             complex_tone_frequency_variance_bound(1.0, plan.samples, rate_hz)
@@ -130,36 +131,36 @@ class ToneReceiver:
             return _NOTHING
         spectrum = self._search.spectrum(x)
         floor = self._search.guard_noise(spectrum)
-        found = self._search.find(spectrum, floor)
-        if not len(found.slots):
+        tones = self._search.find(spectrum, floor)
+        if not len(tones.slots):
             return _NOTHING
         with np.errstate(all="ignore"):
-            fit = self._fitter.fit(x, found, floor)
+            fit = self._fitter.fit(x, tones, floor)
         noise = self._search.noise(spectrum, fit.frequency_hz)
-        return self._report(found.slots.tolist(), fit, noise)
+        return self._report(tones.slots.tolist(), fit, noise)
 
     def _report(self, slots: list[int], fit: ToneFit, noise: float) -> ToneShifts:
         """What can be trusted of a fit."""
         columns = zip(slots, *(column.tolist() for column in fit), strict=True)
         strongest = max((p for p in fit.power.tolist() if p == p), default=0.0) / noise
         least = max(self.least_snr, _DYNAMIC_RANGE * strongest)
-        most_misfit = self._most_misfit + _MODEL_ERROR * strongest
-        found = []
+        most_chi_square = self._most_chi_square + _MODEL_ERROR * strongest
+        tones = []
         for slot, frequency_hz, chirp, power, residual, last_step_rad in columns:
-            snr, misfit = power / noise, residual / noise
+            snr, reduced_chi_square = power / noise, residual / noise
             shift_hz = frequency_hz - self._middle_hz[slot]
             good = (  # false also for what is not a number
                 snr > least
-                and misfit < most_misfit
+                and reduced_chi_square < most_chi_square
                 and last_step_rad < _SETTLED_RAD
                 and abs(shift_hz) <= self._most_shift_hz
             )
             if good:
                 variance = self._unit_variance / min(snr, MAX_SNR)
-                found.append((slot, shift_hz, variance, snr, chirp, misfit))
-        if not found:
+                tones.append((slot, shift_hz, variance, snr, chirp, reduced_chi_square))
+        if not tones:
             return _NOTHING
-        numbers, *values = zip(*found, strict=True)
+        numbers, *values = zip(*tones, strict=True)
         return ToneShifts(np.array(numbers, dtype=np.intp), *map(np.array, values))
 
 
@@ -195,7 +196,7 @@ def _usable(x: ComplexArray) -> bool:
     if not math.isfinite(energy) or energy == 0.0:
         return False
     # A clipped wave sits at both ends of the range again and again.
-    most = _CLIPPED_SHARE * parts.size
+    most = _CLIPPED_FRACTION * parts.size
     return not (
         np.count_nonzero(parts == np.max(parts)) >= most
         and np.count_nonzero(parts == np.min(parts)) >= most

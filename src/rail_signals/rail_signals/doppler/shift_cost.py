@@ -24,7 +24,7 @@ _MOST_STEP_M = 20.0
 
 
 @dataclass(frozen=True)
-class Heard:
+class ReceivedShift:
     """One station of a block: its antenna [m], its shift and what that depends on.
 
     The shift is ``per_mps v C(s, v) + scale delta``, C the mean rate; ``weight`` is one over the
@@ -55,7 +55,7 @@ class ShiftCost:
     Parameters
     ----------
     line : SurveyedLine
-    heard : sequence of Heard
+    received : sequence of ReceivedShift
     averaging_time_s : float
         `doppler_plan.TonePlan.averaging_time_s`.
     speed, offset : (float, float)
@@ -65,14 +65,14 @@ class ShiftCost:
     def __init__(
         self,
         line: SurveyedLine,
-        heard: Sequence[Heard],
+        received: Sequence[ReceivedShift],
         averaging_time_s: float,
         speed: tuple[float, float],
         offset: tuple[float, float],
     ) -> None:
         self._line, self._tau_s = line, averaging_time_s
-        self._heard = [
-            (h.x_m, h.y_m, h.z_m, h.shift_hz, h.weight, h.per_mps, h.scale) for h in heard
+        self._received = [
+            (h.x_m, h.y_m, h.z_m, h.shift_hz, h.weight, h.per_mps, h.scale) for h in received
         ]
         self._speed, self._offset = speed, offset
 
@@ -82,7 +82,7 @@ class ShiftCost:
         frames = self._line.frame(s - v * self._tau_s), self._line.frame(s + v * self._tau_s)
         (mean_v, weight_v), (mean_d, weight_d) = self._speed, self._offset
         total = weight_v * (v - mean_v) ** 2 + weight_d * (delta - mean_d) ** 2
-        for sx, sy, sz, shift, weight, per_mps, scale in self._heard:
+        for sx, sy, sz, shift, weight, per_mps, scale in self._received:
             rate = 0.0
             for px, py, pz, tx, ty, tz, _, _, _ in frames:
                 dx, dy, dz = px - sx, py - sy, pz - sz
@@ -96,14 +96,14 @@ class ShiftCost:
         The cost is that of a parabola.
         """
         s, v, delta = at
-        way = v * self._tau_s
-        frames = self._line.frame(s - way), self._line.frame(s + way)
+        run_m = v * self._tau_s
+        frames = self._line.frame(s - run_m), self._line.frame(s + run_m)
         (mean_v, weight_v), (mean_d, weight_d) = self._speed, self._offset
         off_v, off_d = mean_v - v, mean_d - delta
         n00, n01, n02, n11, n12, n22 = 0.0, 0.0, 0.0, weight_v, 0.0, weight_d
         f0, f1, f2 = 0.0, weight_v * off_v, weight_d * off_d
         total = f1 * off_v + f2 * off_d
-        for sx, sy, sz, shift, weight, per_mps, scale in self._heard:
+        for sx, sy, sz, shift, weight, per_mps, scale in self._received:
             rates, bends = [], []
             for px, py, pz, tx, ty, tz, bx, by, bz in frames:
                 dx, dy, dz = px - sx, py - sy, pz - sz
@@ -115,7 +115,7 @@ class ShiftCost:
             mean = 0.5 * (rates[0] + rates[1])
             left = shift - per_mps * v * mean - scale * delta
             by_s = per_mps * v * 0.5 * (bends[0] + bends[1])
-            by_v = per_mps * (mean + 0.5 * way * (bends[1] - bends[0]))
+            by_v = per_mps * (mean + 0.5 * run_m * (bends[1] - bends[0]))
             ws, wv = weight * by_s, weight * by_v
             n00 += ws * by_s
             n01 += ws * by_v
@@ -146,11 +146,15 @@ class ShiftCost:
             if cost > worst or not abs(ds) < 1e9:
                 return None
             # No farther than where the rates keep their shape, and not far off the line.
-            share = min(1.0, _MOST_STEP_M / max(abs(ds), 1e-9))
-            s = at[0] + share * ds
+            fraction = min(1.0, _MOST_STEP_M / max(abs(ds), 1e-9))
+            s = at[0] + fraction * ds
             inside = window_m[0] <= s <= window_m[1]
-            at = (min(max(s, window_m[0]), window_m[1]), at[1] + share * dv, at[2] + share * dd)
-            if inside and share * abs(ds) < _STEP_M and share * abs(dv) < _STEP_MPS:
+            at = (
+                min(max(s, window_m[0]), window_m[1]),
+                at[1] + fraction * dv,
+                at[2] + fraction * dd,
+            )
+            if inside and fraction * abs(ds) < _STEP_M and fraction * abs(dv) < _STEP_MPS:
                 return Minimum(at, self(at), normal)
         return None
 

@@ -15,7 +15,7 @@ speed, so that neither standstill nor a station abeam is special (S1, claims 4 t
 second shift). Wide priors keep what the stations leave open finite: no train runs faster than
 `TonePlan.max_speed_mps`, no receiver is further off than `TonePlan.max_offset_ppm`.
 
-A position is given only where it deserves trust; `Reason` says why not.
+A position is given only where it deserves trust; `NoFixReason` says why not.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from scipy.special import chdtri
 from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 
-from .shift_cost import Heard, ShiftCost, Symmetric, inverse
+from .shift_cost import ReceivedShift, ShiftCost, Symmetric, inverse
 from .surveyed_line import SurveyedLine
 from .tone_plan import TonePlan
 
@@ -40,13 +40,13 @@ _CLEARLY_WORSE = 25.0
 #: A speed is told from standstill by so many of its standard deviations.
 _MOVING_SIGMAS = 5.0
 #: Probability that a right answer is refused as inconsistent.
-_MISFIT_RISK = 1e-6
+_CHI_SQUARE_RISK = 1e-6
 _MOST_CANDIDATES = 4
 #: The cost may differ by so much from its parabola two sigma away, where that is 4.
 _BENT = 1.0
 
 
-class Reason(IntEnum):
+class NoFixReason(IntEnum):
     """Why there is no position."""
 
     NONE = 0
@@ -65,18 +65,18 @@ class Reason(IntEnum):
 
 
 @dataclass(frozen=True)
-class Fix:
+class DopplerSolution:
     """Chainage [m], speed [m/s] along it, offset of the receiver [Hz], and their covariance.
 
-    ``covariance`` float64 [3, 3] in this order; ``misfit`` the cost that is left; ``freedom`` how
-    many measurements there were beyond what was asked for.
+    ``covariance`` float64 [3, 3] in this order; ``chi_square`` the cost that is left; ``freedom``
+    how many measurements there were beyond what was asked for.
     """
 
     chainage_m: float
     speed_mps: float
     offset_hz: float
     covariance: FloatArray
-    misfit: float
+    chi_square: float
     freedom: int
 
     @property
@@ -89,8 +89,8 @@ class Fix:
 class Answer:
     """A fix, or why there is none."""
 
-    reason: Reason
-    fix: Fix | None = None
+    reason: NoFixReason
+    fix: DopplerSolution | None = None
 
 
 @dataclass(frozen=True)
@@ -157,11 +157,11 @@ class DopplerSolver:
     def stations_of(self, slots: ArrayLike, near_m: float) -> NDArray[np.int64]:
         """Station of each slot that stands nearest to a chainage; -1 where there is none."""
         away_m = np.abs(self.feet_m - near_m)
-        found = []
+        solutions = []
         for slot in np.atleast_1d(np.asarray(slots)).tolist():
             here = np.flatnonzero(self.slots == slot)
-            found.append(int(here[np.argmin(away_m[here])]) if here.size else -1)
-        return np.array(found, dtype=np.int64)
+            solutions.append(int(here[np.argmin(away_m[here])]) if here.size else -1)
+        return np.array(solutions, dtype=np.int64)
 
     def solve(
         self,
@@ -207,7 +207,7 @@ class DopplerSolver:
         if not (np.isfinite(z).all() and np.isfinite(variance).all() and (variance > 0.0).all()):
             raise ValueError("shift_hz and variance_hz2 must be finite, variances above zero")
         if z.size < 2:
-            return Answer(Reason.TOO_FEW_STATIONS)
+            return Answer(NoFixReason.TOO_FEW_STATIONS)
         measured = _Measured(self, number, z, 1.0 / variance, offset, speed)
         low_m, high_m = self.line.start_m, self.line.end_m
         if window_m is not None:
@@ -215,7 +215,7 @@ class DopplerSolver:
         first = int(np.searchsorted(self._grid_m, low_m))
         last = int(np.searchsorted(self._grid_m, high_m, side="right"))
         if last - first < 3:
-            return Answer(Reason.OFF_TRACK)
+            return Answer(NoFixReason.OFF_TRACK)
         places_m = self._grid_m[first:last]
         cost, v = measured.profile(self._rates[number, first:last])
         if direction:
@@ -225,27 +225,27 @@ class DopplerSolver:
         ends = [i for i, j in ((0, 1), (-1, -2)) if cost[i] < cost[j]]
         least = float(np.min(cost))
         if measured.standing <= least + _MOVING_SIGMAS**2:
-            return Answer(Reason.STANDSTILL)
+            return Answer(NoFixReason.STANDSTILL)
         order = minima[np.argsort(cost[minima])][:_MOST_CANDIDATES]
-        found = measured.refine(places_m[order].tolist(), v[order].tolist(), (low_m, high_m))
+        solutions = measured.refine(places_m[order].tolist(), v[order].tolist(), (low_m, high_m))
         if direction:
-            found = [f for f in found if f.speed_mps * direction > 0.0]
-        if not found:
-            return Answer(Reason.OFF_TRACK if ends else Reason.GEOMETRY)
-        best = found[0]
-        if any(cost[i] < best.misfit + _CLEARLY_WORSE for i in ends):
-            return Answer(Reason.OFF_TRACK)
-        if best.freedom > 0 and best.misfit > chdtri(best.freedom, _MISFIT_RISK):
-            return Answer(Reason.INCONSISTENT)
+            solutions = [f for f in solutions if f.speed_mps * direction > 0.0]
+        if not solutions:
+            return Answer(NoFixReason.OFF_TRACK if ends else NoFixReason.GEOMETRY)
+        best = solutions[0]
+        if any(cost[i] < best.chi_square + _CLEARLY_WORSE for i in ends):
+            return Answer(NoFixReason.OFF_TRACK)
+        if best.freedom > 0 and best.chi_square > chdtri(best.freedom, _CHI_SQUARE_RISK):
+            return Answer(NoFixReason.INCONSISTENT)
         if abs(best.speed_mps) < _MOVING_SIGMAS * sqrt(float(best.covariance[1, 1])):
-            return Answer(Reason.STANDSTILL)
+            return Answer(NoFixReason.STANDSTILL)
         if not best.sigma_m <= self._worst_m or measured.bent(best):
-            return Answer(Reason.GEOMETRY)
-        for other in found[1:]:
+            return Answer(NoFixReason.GEOMETRY)
+        for other in solutions[1:]:
             apart_m = abs(other.chainage_m - best.chainage_m)
-            if apart_m > 4.0 * best.sigma_m and other.misfit < best.misfit + _CLEARLY_WORSE:
-                return Answer(Reason.AMBIGUOUS)
-        return Answer(Reason.NONE, best)
+            if apart_m > 4.0 * best.sigma_m and other.chi_square < best.chi_square + _CLEARLY_WORSE:
+                return Answer(NoFixReason.AMBIGUOUS)
+        return Answer(NoFixReason.NONE, best)
 
 
 class _Measured:
@@ -269,7 +269,7 @@ class _Measured:
         columns = (*solver.stations_m[number].T, z, weight, self._a, self._b)
         self.cost = ShiftCost(
             solver.line,
-            [Heard(*row) for row in np.stack(columns, axis=1).tolist()],
+            [ReceivedShift(*row) for row in np.stack(columns, axis=1).tolist()],
             solver.plan.averaging_time_s,
             (self._speed.mean, self._wv),
             (self._offset.mean, self._wo),
@@ -291,12 +291,12 @@ class _Measured:
         """Least cost and best speed at places, from dR/ds [station, place]."""
         a = self._a[:, None] * rates
         # What the offset cannot take over of the effect of a speed.
-        share = ((self._w * self._b) @ a) / self._s22
-        a -= self._b[:, None] * share
-        weight = self._w @ (a * a) + self._wo * share**2 + self._wv
+        fraction = ((self._w * self._b) @ a) / self._s22
+        a -= self._b[:, None] * fraction
+        weight = self._w @ (a * a) + self._wo * fraction**2 + self._wv
         force = (
             (self._w * self._still) @ a
-            - self._wo * self._still_prior * share
+            - self._wo * self._still_prior * fraction
             + self._wv * self._speed.mean
         )
         v = force / weight
@@ -304,27 +304,29 @@ class _Measured:
 
     def refine(
         self, places_m: list[float], speeds_mps: list[float], window_m: tuple[float, float]
-    ) -> list[Fix]:
+    ) -> list[DopplerSolution]:
         """Minima near places at speeds, the best first; none that leaves the window."""
-        found = []
+        solutions = []
         best = inf
         for s, v in zip(places_m, speeds_mps, strict=True):
             here = self.cost.minimum(
                 (s, v, self._offset.mean), window_m, best + 2.0 * _CLEARLY_WORSE
             )
             if here is not None:
-                found.append(here)
+                solutions.append(here)
                 best = min(best, here.cost)
-        found.sort(key=lambda minimum: minimum.cost)
+        solutions.sort(key=lambda minimum: minimum.cost)
         freedom = self._z.size + self._informed - 3
-        return [Fix(*m.at, _full(inverse(m.normal)), m.cost, freedom) for m in found]
+        return [
+            DopplerSolution(*m.at, _full(inverse(m.normal)), m.cost, freedom) for m in solutions
+        ]
 
-    def bent(self, fix: Fix) -> bool:
+    def bent(self, fix: DopplerSolution) -> bool:
         """Whether the cost is no parabola within two sigma, so that the covariance misleads."""
         ds, dv, dd = (2.0 / fix.sigma_m * fix.covariance[0]).tolist()
         s, v, delta = fix.chainage_m, fix.speed_mps, fix.offset_hz
         sides = (s + ds, v + dv, delta + dd), (s - ds, v - dv, delta - dd)
-        return any(abs(self.cost(side) - fix.misfit - 4.0) > _BENT for side in sides)
+        return any(abs(self.cost(side) - fix.chi_square - 4.0) > _BENT for side in sides)
 
 
 def _full(c: Symmetric) -> FloatArray:

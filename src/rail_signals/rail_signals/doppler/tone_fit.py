@@ -2,7 +2,8 @@
 
 The block is turned back by each frequency and averaged over pieces of a millisecond. These 32
 values are, but for 1e-4, all that the block tells about a tone. What the other tones leave in
-them is known (`doppler_tone_leakage`), so that all tones are fitted together, by Gauss-Newton.
+them is known (`rail_signals.doppler.tone_leakage`), so that all tones are fitted together, by
+Gauss-Newton.
 
 Phase and amplitude of a tone are polynomials orthogonal over the block. The linear term of the
 phase is the shift: because of the orthogonality its variance is that of a pure tone,
@@ -23,7 +24,7 @@ from rail_signals.phasors import cis
 
 from .tone_leakage import Leakage
 from .tone_plan import TonePlan
-from .tone_search import Found
+from .tone_search import DetectedTones
 
 #: Pieces of a block.
 PIECES = 32
@@ -76,16 +77,16 @@ class ToneFitter:
         self._hz = float(self._course[1, -1])
         self._templates, self._template_hz, self._template_chirp = _templates(plan, piece_s)
 
-    def fit(self, block: ComplexArray, found: Found, noise: float) -> ToneFit:
-        """Fit all tones of ``found`` to a block, complex [samples]; ``noise`` power per sample."""
-        turn = cis(found.frequency_hz[:, None] * self._turns)
+    def fit(self, block: ComplexArray, detected: DetectedTones, noise: float) -> ToneFit:
+        """Fit the tones ``detected`` to a block, complex [samples]; ``noise`` power per sample."""
+        turn = cis(detected.frequency_hz[:, None] * self._turns)
         within, turn = turn[:, : self._length], turn[:, self._length :]
         sums = block.reshape(PIECES, self._length) @ within.T
         pieces = sums.T * turn / self._length
-        leakage = Leakage(found.frequency_hz, self._rate_hz, self._length)
-        level = found.level
+        leakage = Leakage(detected.frequency_hz, self._rate_hz, self._length)
+        level = detected.level
         weak = level.real**2 + level.imag**2 < _STRONG * noise / self._samples
-        phase, amplitude = self._start(found, pieces, turn, leakage, weak)
+        phase, amplitude = self._start(detected, pieces, turn, leakage, weak)
         # Free of leakage, each piece of a strong tone tells its phase; else sums are linear.
         strong = not weak.any()
         least = 0.3 * amplitude[:, 0]
@@ -113,7 +114,7 @@ class ToneFitter:
         inner = rest @ self._mean
         left = np.vecdot(rest, rest).real / PIECES - np.vecdot(inner, inner).real
         return ToneFit(
-            found.frequency_hz + phase[:, 1] * self._hz,
+            detected.frequency_hz + phase[:, 1] * self._hz,
             phase[:, 2] / self._per_chirp[2],
             amplitude[:, 0] ** 2,
             left * (self._length * PIECES / (PIECES - PHASE_TERMS)),
@@ -122,7 +123,7 @@ class ToneFitter:
 
     def _start(
         self,
-        found: Found,
+        detected: DetectedTones,
         pieces: ComplexArray,
         turn: ComplexArray,
         leakage: Leakage,
@@ -133,7 +134,7 @@ class ToneFitter:
         Weak tones are searched again, without the window: it hides the ends of the block, which
         tell the chirp, and half of the energy.
         """
-        _, _, chirp, level = found
+        _, _, chirp, level = detected
         phase = np.zeros((len(chirp), PHASE_TERMS))
         if weak.any():
             bend = chirp[:, None] * self._bend

@@ -34,7 +34,7 @@ _OFFSETS_PER_BIN = 1
 _CHIRP_PHASE_RAD = 1.6
 
 
-class Found(NamedTuple):
+class DetectedTones(NamedTuple):
     """Slots that may hold a tone, and a first guess of each; arrays [n].
 
     ``frequency_hz``, relative to the carrier, and complex ``level`` are those at mid-block.
@@ -67,8 +67,8 @@ class ToneSearch:
         self._bins = (self._first[:, None] + np.arange(2 * half + 1)) % samples
         self._slot = np.arange(plan.slots)
         self._guard = _guard_bins(plan, middle)
-        reach = 2 * math.ceil(plan.lobe_hz / plan.bin_hz)
-        self._near = np.arange(-reach, reach + 1)
+        half_width = 2 * math.ceil(plan.lobe_hz / plan.bin_hz)
+        self._near = np.arange(-half_width, half_width + 1)
         # The transform counts time from the first sample; tones are referred to the middle.
         self._middle = math.pi * (samples - 1) / samples
         self._templates = _Templates(plan, self._window, cis(self._middle * _AROUND))
@@ -92,7 +92,7 @@ class ToneSearch:
         energy = np.vdot(spectrum, spectrum).real - np.vdot(near, near).real
         return float(energy) / ((samples - near.size) * self._energy)
 
-    def find(self, spectrum: ComplexArray, noise: float) -> Found:
+    def find(self, spectrum: ComplexArray, noise: float) -> DetectedTones:
         """Slots with a peak above the noise, and what the templates say of it."""
         height = np.abs(spectrum.take(self._bins))
         peak = height.argmax(axis=1)
@@ -102,7 +102,7 @@ class ToneSearch:
         lines = spectrum.take(bins[:, None] + _AROUND, mode="wrap")
         offset_hz, chirp, level = self._templates.best(lines)
         level *= cis(self._middle * bins)
-        return Found(slots, bins * self.plan.bin_hz + offset_hz, chirp, level)
+        return DetectedTones(slots, bins * self.plan.bin_hz + offset_hz, chirp, level)
 
 
 class _Templates:
@@ -163,9 +163,9 @@ def _window(turns: FloatArray) -> FloatArray:
 def _guard_bins(plan: TonePlan, middle: list[float]) -> NDArray[np.intp]:
     """Bins that no tone within the limits of the plan reaches."""
     samples = plan.samples
-    reach = (plan.max_shift_hz + plan.lobe_hz) / plan.bin_hz
+    half_width = (plan.max_shift_hz + plan.lobe_hz) / plan.bin_hz
     bins = np.arange(samples)
     near = np.zeros(samples, dtype=np.bool_)
     for m in middle:
-        near |= np.abs((bins - m + samples / 2) % samples - samples / 2) < reach
+        near |= np.abs((bins - m + samples / 2) % samples - samples / 2) < half_width
     return np.flatnonzero(~near)

@@ -57,7 +57,7 @@ LOST_M: Final = 1e3
 """A filter less sure of its chainage than this begins anew with the next fix."""
 
 
-class Outcome(NamedTuple):
+class UpdateResult(NamedTuple):
     """What became of a scalar reading.
 
     Attributes
@@ -73,7 +73,7 @@ class Outcome(NamedTuple):
     variance: FloatArray
 
 
-Outcomes: TypeAlias = tuple[Outcome, ...]
+Outcomes: TypeAlias = tuple[UpdateResult, ...]
 """Of a reading, one for each of its scalars."""
 
 
@@ -248,7 +248,7 @@ class FilterBank:
 
     def take(
         self, row: MeasurementRow, reading: Values, variance: Values, use: BoolArray
-    ) -> Outcome:
+    ) -> UpdateResult:
         """Take a scalar reading ``reading = row x + noise``.
 
         Parameters
@@ -273,7 +273,7 @@ class FilterBank:
         g = g * (weight * use)
         self.x += g * normal
         self.p -= g[:, None] * g
-        return Outcome(refused, innovation, total)
+        return UpdateResult(refused, innovation, total)
 
     def start(self, chainage_m: Values, use: BoolArray) -> None:
         """Let filters that know no position begin about a fix, to be taken right after."""

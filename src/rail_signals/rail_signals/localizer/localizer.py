@@ -17,8 +17,8 @@ import numpy as np
 from .filter_bank import BoolArray, FilterBank, Outcomes, Values
 from .integrity_monitor import IntegrityMonitor
 from .protection_level import Estimate, ProtectionLevels
-from .readings import MeasurementModel, RangeFix, TickReadings
-from .screening import ReadingScreen, Rejected, Rejection
+from .readings import MeasurementModel, RangeFix, TickMeasurements
+from .screening import ReadingScreen, Rejection, UnusedReading
 from .settings import LocalizerSettings, Sensor
 from .wheel_slip import SlipDetector
 
@@ -43,13 +43,14 @@ class Localizer:
     >>> from rail_signals.localizer.protection_level import Localization
     >>> from rail_signals.localizer.readings import WheelSpeed
     >>> localizer = Localizer(LocalizerSettings())
-    >>> Localization.of(localizer.tick(0.0, TickReadings(odometer=WheelSpeed(20.0, 0.0)))).reason
+    >>> wheels = TickMeasurements(odometer=WheelSpeed(20.0, 0.0))
+    >>> Localization.of(localizer.tick(0.0, wheels)).reason
     <Reason.NO_FIX: 1>
     >>> localizer.place(1000.0, 1.0, speed_mps=20.0)
     >>> rng = np.random.default_rng(1)
     >>> for time_s in np.arange(1, 11) / 10:
     ...     measured_m = 1000.0 + 20.0 * time_s + 0.1 * rng.standard_normal()
-    ...     readings = TickReadings(
+    ...     readings = TickMeasurements(
     ...         RangeFix(measured_m, 0.01, age_s=0.0), odometer=WheelSpeed(20.0, age_s=0.0)
     ...     )
     ...     here = Localization.of(localizer.tick(time_s, readings))
@@ -74,7 +75,7 @@ class Localizer:
         self._time_s = -inf
 
     @property
-    def rejected(self) -> list[Rejected]:
+    def rejected(self) -> list[UnusedReading]:
         """Readings of the last tick that were no evidence."""
         return self._screen.rejected
 
@@ -110,7 +111,7 @@ class Localizer:
         self.bank.place(where, chainage_m, sigma_m, speed_mps, sigma_mps)
         self.monitor.forget(where)
 
-    def tick(self, time_s: float, readings: TickReadings) -> Estimate:
+    def tick(self, time_s: float, readings: TickMeasurements) -> Estimate:
         """Take what came since the tick before, and say what is known now.
 
         Readings that are no evidence are kept out and counted, see `ReadingScreen`.
@@ -119,7 +120,7 @@ class Localizer:
         ----------
         time_s : float
             Now.
-        readings : TickReadings
+        readings : TickMeasurements
 
         Raises
         ------
@@ -141,7 +142,7 @@ class Localizer:
         self.monitor.test(self.bank, step_s)
         return self._levels.estimate(self.bank, self.monitor, step_s)
 
-    def _take(self, readings: TickReadings) -> None:
+    def _take(self, readings: TickMeasurements) -> None:
         model = self._model
         # The wheels come first: by them the other fixes are compared with how far it has come.
         if (wheels := readings.odometer) is not None:

@@ -27,7 +27,7 @@ class Status(IntEnum):
     """Holds even if any one sensor is faulty."""
 
 
-class Reason(IntEnum):
+class ProtectionReason(IntEnum):
     """Why a position is not, or not fully, protected."""
 
     NONE = 0
@@ -57,8 +57,8 @@ class Estimate(NamedTuple):
     sigma_m : float64
         Standard deviation of the position if no sensor is faulty.
     status, reason : int64
-        As `Status` and `Reason`.
-    found : bool
+        As `Status` and `ProtectionReason`.
+    detected : bool
         Whether a sensor is known to be faulty.
     excluded : bool [..., sensor]
         Sensors that are left out.
@@ -75,7 +75,7 @@ class Estimate(NamedTuple):
     sigma_m: FloatArray
     status: IntArray
     reason: IntArray
-    found: BoolArray
+    detected: BoolArray
     excluded: BoolArray
     uncovered: BoolArray
 
@@ -99,9 +99,9 @@ class Localization:
     sigma_m : float
         Standard deviation of the position if no sensor is faulty.
     status : Status
-    reason : Reason
+    reason : ProtectionReason
         Why the status is no better.
-    found : bool
+    detected : bool
         Whether a sensor is known to be faulty.
     excluded, uncovered : frozenset of Sensor
         Sensors left out, and those whose fault the interval does not survive.
@@ -115,8 +115,8 @@ class Localization:
     speed_high_mps: float
     sigma_m: float
     status: Status
-    reason: Reason
-    found: bool
+    reason: ProtectionReason
+    detected: bool
     excluded: frozenset[Sensor]
     uncovered: frozenset[Sensor]
 
@@ -132,8 +132,8 @@ class Localization:
             float(estimate.speed_high_mps),
             float(estimate.sigma_m),
             Status(int(estimate.status)),
-            Reason(int(estimate.reason)),
-            bool(estimate.found),
+            ProtectionReason(int(estimate.reason)),
+            bool(estimate.detected),
             _sensors(estimate.excluded.tolist()),
             _sensors(estimate.uncovered.tolist()),
         )
@@ -199,29 +199,33 @@ class ProtectionLevels:
         uncovered = considered[..., 1:] & ~covered[..., 1:]
         some = uncovered.any(axis=-1)
         contrary = ~possible.any(axis=-1) | (excluded > 1) | ((excluded == 1) & ~healthy)
-        reason = np.full(wide.shape, int(Reason.NONE))
+        reason = np.full(wide.shape, int(ProtectionReason.NONE))
         # The last that applies is reported.
         for which, why in (
-            (some, Reason.TOO_FEW_SENSORS),
-            (wide | (healthy & ~covered[..., 0]), Reason.TOO_WIDE),
-            (healthy & ~bank.known[..., 0], Reason.NO_FIX),
-            (some & ~healthy, Reason.AMBIGUOUS),
-            (contrary, Reason.CONTRADICTION),
+            (some, ProtectionReason.TOO_FEW_SENSORS),
+            (wide | (healthy & ~covered[..., 0]), ProtectionReason.TOO_WIDE),
+            (healthy & ~bank.known[..., 0], ProtectionReason.NO_FIX),
+            (some & ~healthy, ProtectionReason.AMBIGUOUS),
+            (contrary, ProtectionReason.CONTRADICTION),
         ):
             reason[which] = why
-        few = reason == Reason.TOO_FEW_SENSORS
+        few = reason == ProtectionReason.TOO_FEW_SENSORS
         self._unmonitored_s = np.where(few, self._unmonitored_s + step_s, 0.0)
-        reason[self._unmonitored_s > self._claim.unmonitored_s] = Reason.UNMONITORED_TOO_LONG
+        reason[self._unmonitored_s > self._claim.unmonitored_s] = (
+            ProtectionReason.UNMONITORED_TOO_LONG
+        )
 
         status = np.full(reason.shape, int(Status.UNAVAILABLE))
-        status[reason == Reason.NONE] = Status.PROTECTED
-        status[reason == Reason.TOO_FEW_SENSORS] = Status.UNMONITORED
+        status[reason == ProtectionReason.NONE] = Status.PROTECTED
+        status[reason == ProtectionReason.TOO_FEW_SENSORS] = Status.UNMONITORED
         gone = status == Status.UNAVAILABLE
         low, high = np.where(gone, -np.inf, low), np.where(gone, np.inf, high)
         middle, sigma_m = np.where(gone, np.nan, middle), np.where(gone, np.inf, sigma_m)
-        found = ~healthy | (excluded > 0)
+        detected = ~healthy | (excluded > 0)
         excluded_now = monitor.excluded.copy()
-        return _estimate(middle, low, high, sigma_m, status, reason, found, excluded_now, uncovered)
+        return _estimate(
+            middle, low, high, sigma_m, status, reason, detected, excluded_now, uncovered
+        )
 
 
 def _estimate(
@@ -231,11 +235,11 @@ def _estimate(
     sigma_m: FloatArray,
     status: IntArray,
     reason: IntArray,
-    found: BoolArray,
+    detected: BoolArray,
     excluded: BoolArray,
     uncovered: BoolArray,
 ) -> Estimate:
     return Estimate(
         *(middle[S], low[S], high[S], middle[V], low[V], high[V]),
-        *(sigma_m, status, reason, found, excluded, uncovered),
+        *(sigma_m, status, reason, detected, excluded, uncovered),
     )

@@ -79,7 +79,7 @@ class WheelSpeed(NamedTuple):
     present: bool | BoolArray = True
 
 
-class TickReadings(NamedTuple):
+class TickMeasurements(NamedTuple):
     """What came in a tick; None where no run has any."""
 
     range: RangeFix | None = None

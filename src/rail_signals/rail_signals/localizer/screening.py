@@ -25,7 +25,7 @@ from typing import Any, Final, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from .filter_bank import BoolArray, Values
-from .readings import BlockEntry, DopplerFix, RangeFix, TickReadings, WheelSpeed
+from .readings import BlockEntry, DopplerFix, RangeFix, TickMeasurements, WheelSpeed
 from .settings import Sensor
 
 #: Of one train, or of each run [..., 1].
@@ -52,7 +52,7 @@ class Rejection(Enum):
     FROZEN = "frozen"
 
 
-class Rejected(NamedTuple):
+class UnusedReading(NamedTuple):
     """A reading of this tick that is not used; ``which`` of the runs [..., 1]."""
 
     sensor: Sensor
@@ -101,7 +101,7 @@ class ReadingScreen:
 
     Attributes
     ----------
-    rejected : list of Rejected
+    rejected : list of UnusedReading
         Of the last tick.
     counts : Counter of (Sensor, Rejection)
         Since the beginning.
@@ -110,15 +110,15 @@ class ReadingScreen:
     def __init__(self, oldest_s: float, most_alike: int) -> None:
         self._oldest_s, self._most_alike = oldest_s, most_alike
         self._last = [_Last() for _ in Sensor]
-        self.rejected: list[Rejected] = []
+        self.rejected: list[UnusedReading] = []
         self.counts: Counter[tuple[Sensor, Rejection]] = Counter()
 
-    def screen(self, time_s: float, readings: TickReadings) -> TickReadings:
+    def screen(self, time_s: float, readings: TickMeasurements) -> TickMeasurements:
         """Those of the readings of a tick that are evidence."""
         self.rejected = []
         ranging, doppler, block, wheels = readings
         with np.errstate(over="ignore", invalid="ignore"):
-            return TickReadings(
+            return TickMeasurements(
                 ranging
                 and self._evidence(
                     Sensor.RANGE,
@@ -177,7 +177,7 @@ class ReadingScreen:
         # Unequal rather than "and not": the same for a bool and for an array of them.
         failed = valid != left
         if failed is not False and (count := int(np.count_nonzero(failed))):
-            self.rejected.append(Rejected(sensor, why, failed))
+            self.rejected.append(UnusedReading(sensor, why, failed))
             self.counts[sensor, why] += count
         return left
 

@@ -65,7 +65,7 @@ def complex_tone_frequency_variance_bound(
     """Bound on the frequency of a complex tone of unknown phase [Hz^2].
 
     ``6 fs^2 / ((2 pi)^2 gamma N (N^2 - 1))``. It also holds for the carrier of an FM
-    wave, since its lines share one offset and their powers add.
+    wave, since its components share one offset and their powers add.
     """
     n = _array(samples)
     denominator = (2 * math.pi) ** 2 * _array(snr) * n * (n**2 - 1)

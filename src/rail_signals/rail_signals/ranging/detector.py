@@ -1,7 +1,7 @@
-"""Constant-false-alarm threshold for energy on spectral lines.
+"""Constant-false-alarm threshold for energy on spectral components.
 
-Under noise alone, the share of the energy that falls onto L of M dimensions follows a
-Beta(L, M - L) law, whatever the noise level. The receiver takes the largest share over
+Under noise alone, the fraction of the energy that falls onto L of M dimensions follows a
+Beta(L, M - L) law, whatever the noise level. The receiver takes the largest fraction over
 an interval of frequency offsets; Rice's formula for the rate of up-crossings of that
 random process bounds the false-alarm probability of the maximum.
 """
@@ -15,16 +15,16 @@ from scipy.special import betainc, betaln
 
 
 def false_alarm_probability(
-    share: float, lines: int, dimensions: int, search_hz: float, duration_s: float
+    fraction: float, components: int, dimensions: int, search_hz: float, duration_s: float
 ) -> float:
-    """Bound on the probability that noise puts more than `share` onto the lines.
+    """Bound on the probability that noise puts more than `fraction` onto the components.
 
     Parameters
     ----------
-    share
-        Threshold on the share of energy, in (0, 1).
-    lines, dimensions
-        Complex dimensions L of the lines and M of the block.
+    fraction
+        Threshold on the fraction of energy, in (0, 1).
+    components, dimensions
+        Complex dimensions L of the components and M of the block.
     search_hz
         Width of the interval of frequency offsets searched [Hz]; 0 for none.
     duration_s
@@ -36,20 +36,22 @@ def false_alarm_probability(
     ``lambda = (2 pi T)^2 / 12``, the second moment of time over the block, and p the
     density of Beta(L, M - L); tight where P is small.
     """
-    rest = dimensions - lines
-    tail = float(betainc(rest, lines, 1 - share))
+    rest = dimensions - components
+    tail = float(betainc(rest, components, 1 - fraction))
     log_density = (
-        (lines - 1) * math.log(share) + (rest - 1) * math.log1p(-share) - betaln(lines, rest)
+        (components - 1) * math.log(fraction)
+        + (rest - 1) * math.log1p(-fraction)
+        - betaln(components, rest)
     )
     spread = (2 * math.pi * duration_s) ** 2 / 12
-    rate = math.sqrt(share * (1 - share) * spread / (math.pi * rest)) * math.exp(log_density)
+    rate = math.sqrt(fraction * (1 - fraction) * spread / (math.pi * rest)) * math.exp(log_density)
     return tail + search_hz * rate
 
 
-def detection_share(
-    false_alarm: float, lines: int, dimensions: int, search_hz: float, duration_s: float
+def detection_threshold(
+    false_alarm: float, components: int, dimensions: int, search_hz: float, duration_s: float
 ) -> float:
-    """Share of the energy above which lines count as detected.
+    """Fraction of the energy above which components count as detected.
 
     Solves `false_alarm_probability` for its first argument.
 
@@ -60,12 +62,14 @@ def detection_share(
     """
     if not 0 < false_alarm < 0.5:
         raise ValueError(f"false_alarm must lie between 0 and 0.5, got {false_alarm!r}")
-    if dimensions <= lines + 1:
-        raise ValueError(f"samples must exceed the {lines} spectral lines, got {dimensions}")
+    if dimensions <= components + 1:
+        raise ValueError(
+            f"samples must exceed the {components} spectral components, got {dimensions}"
+        )
 
-    def excess(share: float) -> float:
-        bound = false_alarm_probability(share, lines, dimensions, search_hz, duration_s)
+    def excess(fraction: float) -> float:
+        bound = false_alarm_probability(fraction, components, dimensions, search_hz, duration_s)
         return math.log(max(bound, 1e-300)) - math.log(false_alarm)
 
-    # The mean share L / M is below any threshold for less than one half.
-    return float(brentq(excess, lines / dimensions, 1 - 1e-12))
+    # The mean fraction L / M is below any threshold for less than one half.
+    return float(brentq(excess, components / dimensions, 1 - 1e-12))

@@ -1,8 +1,8 @@
-"""The spectral lines of an FM ranging signal.
+"""The spectral components of an FM ranging signal.
 
-By the Jacobi-Anger expansion the wave is a sum of lines at ``m_1 f_1 + m_2 f_2`` with
+By the Jacobi-Anger expansion the wave is a sum of components at ``m_1 f_1 + m_2 f_2`` with
 amplitude ``J_m1(beta_1) J_m2(beta_2)`` and phase ``-(m_1 theta_1 + m_2 theta_2)``: the
-order of a line is the factor by which it magnifies the lag of the tone.
+order of a component is the factor by which it magnifies the lag of the tone.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from rail_signals.arrays import FloatArray
 from .signal import RangingSignal
 
 LOST_INFORMATION = 3e-3
-"""Share of the Fisher information of each tone that the kept lines may leave out."""
+"""Fraction of the Fisher information of each tone that the kept components may leave out."""
 
 OVERLAP_LIMIT = 1e-7
-"""Largest share of the power that left-out lines may put onto kept ones."""
+"""Largest fraction of the power that left-out components may put onto kept ones."""
 
 _MAX_ORDER = 40
 
 
 @dataclass(frozen=True)
-class LineSpectrum:
-    """Lines that together carry the phases of the tones; arrays of L lines, T tones.
+class FmSpectrum:
+    """Components that together carry the phases of the tones; arrays of L components, T tones.
 
     Attributes
     ----------
     orders : int [L, T]
-        Order of the line in each tone.
+        Order of the component in each tone.
     bins : int [L]
-        Cycles of the line in one period of the signal, modulo the period.
+        Cycles of the component in one period of the signal, modulo the period.
     amplitudes : float [L]
         Product of Bessel functions, for a wave of unit amplitude.
     """
@@ -47,22 +47,22 @@ class LineSpectrum:
 
     @property
     def power(self) -> float:
-        """Power of the lines, of a wave of unit power."""
+        """Power of the components, of a wave of unit power."""
         return float((self.amplitudes**2).sum())
 
     @property
     def information(self) -> FloatArray:
-        """``sum m_i^2 J^2`` of each tone [T]; half its squared index if no line is left out."""
+        """``sum m_i^2 J^2`` of each tone [T]; half its squared index if none is left out."""
         return np.asarray((self.orders**2).T @ self.amplitudes**2)
 
-    def strongest(self, share: float) -> LineSpectrum:
-        """Return the fewest lines that carry `share` of the power of these, ties whole."""
+    def strongest(self, fraction: float) -> FmSpectrum:
+        """Return the fewest components that carry `fraction` of the power of these, ties whole."""
         power = self.amplitudes**2
-        keep = power >= _tie(_cut(power, share * power.sum()))
-        return LineSpectrum(self.orders[keep], self.bins[keep], self.amplitudes[keep])
+        keep = power >= _tie(_cut(power, fraction * power.sum()))
+        return FmSpectrum(self.orders[keep], self.bins[keep], self.amplitudes[keep])
 
     def real_basis(self, period: int) -> FloatArray:
-        """Matrix [2 * period, 2 L] from a period of samples to its lines.
+        """Matrix [2 * period, 2 L] from a period of samples to its components.
 
         Both are rows of interleaved real and imaginary parts: a real product of this size
         is faster than the complex one. Scaled by ``1 / period``.
@@ -75,17 +75,17 @@ class LineSpectrum:
         return basis.reshape(2 * period, 2 * len(self.bins))
 
 
-def line_spectrum(signal: RangingSignal) -> LineSpectrum:
-    """Lines of `signal` that carry all but `LOST_INFORMATION` of each tone's phase.
+def fm_spectrum(signal: RangingSignal) -> FmSpectrum:
+    """Components of `signal` that carry all but `LOST_INFORMATION` of each tone's phase.
 
     Raises
     ------
     ValueError
-        If lines of the two tones fall onto each other, so that neither tells its order.
+        If components of the two tones fall onto each other, so that neither tells its order.
 
     Examples
     --------
-    >>> line_spectrum(RangingSignal()).orders.ravel().tolist()
+    >>> fm_spectrum(RangingSignal()).orders.ravel().tolist()
     [-3, -2, -1, 0, 1, 2, 3]
     """
     order = np.arange(-_MAX_ORDER, _MAX_ORDER + 1)
@@ -103,7 +103,7 @@ def line_spectrum(signal: RangingSignal) -> LineSpectrum:
         keep |= information >= _tie(_cut(information, enough))
     keep |= power >= float(np.max(power[keep]))
     _check_overlap(signal, bins, power, keep)
-    return LineSpectrum(orders[keep], bins[keep], amplitudes[keep])
+    return FmSpectrum(orders[keep], bins[keep], amplitudes[keep])
 
 
 def _cut(values: FloatArray, enough: float) -> float:
@@ -113,7 +113,7 @@ def _cut(values: FloatArray, enough: float) -> float:
 
 
 def _tie(value: float) -> float:
-    """Lower a cut by a shade: mirrored lines, equal but for rounding, stay together."""
+    """Lower a cut by a shade: mirrored components, equal but for rounding, stay together."""
     return value * (1 - 1e-9)
 
 
@@ -123,12 +123,12 @@ def _check_overlap(
     power: FloatArray,
     keep: NDArray[np.bool_],
 ) -> None:
-    """Reject signals whose lines share a bin with a kept line."""
+    """Reject signals whose components share a bin with a kept component."""
     kept_bins = bins[keep]
     clash = len(np.unique(kept_bins)) < len(kept_bins)
     overlap = float(power[~keep & np.isin(bins, kept_bins)].sum())
     if clash or overlap > OVERLAP_LIMIT:
         raise ValueError(
             f"tones_hz {signal.tones_hz} with deviations_hz {signal.deviations_hz} put spectral"
-            f" lines onto each other; use a smaller deviation or other tones"
+            f" components onto each other; use a smaller deviation or other tones"
         )

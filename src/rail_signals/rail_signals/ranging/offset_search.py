@@ -1,8 +1,8 @@
 """Carrier offset of an FM ranging signal, and its removal.
 
-The lines of the wave share one offset and, over whole periods, keep their phases. So the
-offset is where the lines of the periods, summed coherently over the burst and in power
-over the lines, peak.
+The components of the wave share one offset and, over whole periods, keep their phases. So the
+offset is where the components of the periods, summed coherently over the burst and in power
+over the components, peak.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from numpy.typing import DTypeLike, NDArray
 from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.phasors import cis
 
-from .fm_spectrum import LineSpectrum
+from .fm_spectrum import FmSpectrum
 from .signal import RangingSignal
 
 RealArray: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
 TAPER_LOSS = 1e-9
-"""Largest share of the power of an offset carrier that tapers may leave out."""
+"""Largest fraction of the power of an offset carrier that tapers may leave out."""
 
 MAX_TAPERS = 12
 """Largest number of tapers; with more the sums take longer than they save."""
@@ -40,7 +40,7 @@ class OffsetSearch:
     interval but for `TAPER_LOSS`, so that nothing more is needed of the burst.
 
     Interpolation follows Aboutanios and Mulgrew (IEEE Trans. Signal Processing 53(4),
-    2005), with all lines in one quotient: with ``R(+)``, ``R(-)`` the responses half a
+    2005), with all components in one quotient: with ``R(+)``, ``R(-)`` the responses half a
     cycle per burst above and below and K segments, the remaining offset is
     ``d = K / (pi T) atan(q tan(pi / 2K))``, ``q = sum (|R(+)|^2 - |R(-)|^2) /
     sum |R(+) + R(-)|^2``, times being counted from the middle of the burst.
@@ -49,8 +49,8 @@ class OffsetSearch:
     ----------
     signal
         The signal; at least two periods long.
-    lines
-        Lines to use.
+    components
+        Components to use.
     max_offset_hz
         Largest offset [Hz], above zero.
 
@@ -60,7 +60,7 @@ class OffsetSearch:
         If `max_offset_hz` turns the carrier by nearly half a cycle in a period.
     """
 
-    def __init__(self, signal: RangingSignal, lines: LineSpectrum, max_offset_hz: float) -> None:
+    def __init__(self, signal: RangingSignal, components: FmSpectrum, max_offset_hz: float) -> None:
         period, rate_hz = signal.period_samples, signal.sample_rate_hz
         limit_hz = 0.45 * rate_hz / period
         if max_offset_hz > limit_hz:
@@ -87,11 +87,11 @@ class OffsetSearch:
         self._arc = np.array(math.tan(math.pi / (2 * segments)))
         self._arc_hz = np.array(segments / math.pi / signal.duration_s)
         self._grid_hz = grid_hz[1:-1]
-        tables = _Tables.of(signal, lines, grid_hz, repeats, self.tapers)
+        tables = _Tables.of(signal, components, grid_hz, repeats, self.tapers)
         self._tables: dict[Any, _Tables] = {
             np.dtype(kind): tables.astype(kind) for kind in (np.float32, np.float64)
         }
-        self._line_count, self._grid_count = len(lines.bins), len(grid_hz)
+        self._component_count, self._grid_count = len(components.bins), len(grid_hz)
         i, j = _factors(self._periods)
         self._split = (i, i + j, i + j + _factors(period)[0])
 
@@ -103,8 +103,8 @@ class OffsetSearch:
         batch, _, width = rows.shape
         if width != self._row:
             rows = rows.reshape(batch, -1 if batch else 1, self._row)
-        lines = (rows @ basis).reshape(batch, grid.shape[1], self._line_count)
-        response = (grid @ lines).reshape(batch, self._grid_count, 2 * self._line_count)
+        components = (rows @ basis).reshape(batch, grid.shape[1], self._component_count)
+        response = (grid @ components).reshape(batch, self._grid_count, 2 * self._component_count)
         power = np.vecdot(response, response)
         below, above = response[:, :-2], response[:, 2:]
         total = above + below
@@ -152,7 +152,7 @@ class _Tables(NamedTuple):
     def of(
         cls,
         signal: RangingSignal,
-        lines: LineSpectrum,
+        components: FmSpectrum,
         grid_hz: FloatArray,
         repeats: int,
         tapers: FloatArray | None,
@@ -172,7 +172,7 @@ class _Tables(NamedTuple):
         if tapers is not None:
             turn = turn @ tapers.T
         # Real before imaginary parts, so that products with the grid stay real.
-        basis = lines.real_basis(period).reshape(2 * period, -1, 2).swapaxes(1, 2)
+        basis = components.real_basis(period).reshape(2 * period, -1, 2).swapaxes(1, 2)
         re, im = turn.real, turn.imag
         grid = np.stack([np.stack([re, -im], axis=-1), np.stack([im, re], axis=-1)], axis=1)
         return cls(

@@ -25,7 +25,7 @@ from .signal import wrap_to_turn
 Comparator = Literal["and", "quadrature"]
 
 DEFAULT_MARGIN = 0.05
-"""Share of the unambiguous range kept for ranges that noise makes negative."""
+"""Fraction of the unambiguous range kept for ranges that noise makes negative."""
 
 
 def unambiguous_range_m(tone_hz: float, comparator: Comparator = "quadrature") -> float:

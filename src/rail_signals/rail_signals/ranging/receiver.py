@@ -1,7 +1,7 @@
-"""Receiver that fits carrier and spectral lines of an FM ranging signal.
+"""Receiver that fits carrier and spectral components of an FM ranging signal.
 
 A discriminator forms the phase of each noisy sample and so has a threshold near 10 dB.
-The lines of the wave (`line_spectrum`) carry the same phase information and can be
+The components of the wave (`fm_spectrum`) carry the same phase information and can be
 summed over the burst before anything non-linear happens: the estimate stays at the
 bound ``1 / (gamma N beta^2)`` tens of decibels lower.
 """
@@ -16,20 +16,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from rail_signals.arrays import ComplexArray, FloatArray
 
-from .detector import detection_share
-from .fm_spectrum import line_spectrum
+from .detector import detection_threshold
+from .fm_spectrum import fm_spectrum
 from .offset_search import OffsetSearch, RealArray
 from .signal import RangingSignal
-from .tone_fit import LineFit
+from .tone_fit import TonePhaseFit
 
 MAX_SNR = 1e9
 """Ceiling of the estimated carrier-to-noise ratio (90 dB), where aliased and overlapping
-lines of the order of 1e-9 of the power begin to matter."""
+components of the order of 1e-9 of the power begin to matter."""
 
 MAX_SNR_SINGLE = 1e6
 """The same for bursts in single precision (60 dB), where rounding begins to matter."""
 
-_STRONG_SHARE = 0.92
+_STRONG_FRACTION = 0.92
 _CHUNK_BYTES = 3 << 18
 
 
@@ -37,7 +37,7 @@ _CHUNK_BYTES = 3 << 18
 class ToneEstimate:
     """What a receiver found in each burst. Leading axes are those of the bursts.
 
-    Where nothing was detected, phases, offset and misfit are NaN, the variance is
+    Where nothing was detected, phases, offset and reduced chi-square are NaN, the variance is
     infinite, amplitude and snr are zero.
 
     Attributes
@@ -52,12 +52,12 @@ class ToneEstimate:
         Carrier-to-noise ratio per complex sample (linear), at most `MAX_SNR`.
     frequency_offset_hz : float [...]
         Offset of the carrier [Hz].
-    misfit : float [...]
-        Chi-square per degree of freedom of what the fit leaves on the lines, in terms of
+    reduced_chi_square : float [...]
+        Chi-square per degree of freedom of what the fit leaves on the components, in terms of
         the noise between them. About 1 for one FM signal in white noise; large where a
-        second signal or a jammer lies on the lines.
+        second signal or a jammer lies on the components.
     detected : bool [...]
-        Whether the lines hold more energy than noise would put there.
+        Whether the components hold more energy than noise would put there.
     """
 
     phase_lag_rad: FloatArray
@@ -65,20 +65,20 @@ class ToneEstimate:
     amplitude: FloatArray
     snr: FloatArray
     frequency_offset_hz: FloatArray
-    misfit: FloatArray
+    reduced_chi_square: FloatArray
     detected: NDArray[np.bool_]
 
 
-class LineReceiver:
+class FmToneReceiver:
     """Maximum-likelihood receiver of a `RangingSignal` in white noise.
 
-    1. Offset (`OffsetSearch`): the strong lines of the periods, correlated with a grid of
+    1. Offset (`OffsetSearch`): the strong components of the periods, correlated with a grid of
        frequencies half a cycle per burst apart; the largest sum of squares is interpolated.
     2. Fold: the periods are added after turning back by the offset, about the middle of the
        burst, where the phases of carrier and tones do not depend on the offset's error.
-       The transform of the sum holds every line; what is left of the energy is noise.
-    3. Phases (`LineFit`): products of neighbouring lines start a Gauss-Newton step. A second
-       step would change the error by less than 0.3 % from -10 dB upwards, and by 1.3 % at
+       The transform of the sum holds every component; what is left of the energy is noise.
+    3. Phases (`TonePhaseFit`): products of neighbouring components start a Gauss-Newton step. A
+       second step would change the error by less than 0.3 % from -10 dB upwards, and by 1.3 % at
        -13 dB with two tones (960 samples).
 
     Parameters
@@ -98,7 +98,7 @@ class LineReceiver:
     Examples
     --------
     >>> from rail_signals.ranging.signal import modulate
-    >>> receiver = LineReceiver(RangingSignal())
+    >>> receiver = FmToneReceiver(RangingSignal())
     >>> found = receiver.estimate(modulate(RangingSignal(), [[0.5], [4.0]]))
     >>> found.phase_lag_rad.ravel().round(9).tolist(), found.detected.tolist()
     ([0.5, 4.0], [True, True])
@@ -118,16 +118,16 @@ class LineReceiver:
             raise ValueError(
                 f"samples must hold two periods of {self._period} or more, got {signal.samples}"
             )
-        lines = line_spectrum(signal)
-        strong = lines.strongest(_STRONG_SHARE)
+        components = fm_spectrum(signal)
+        strong = components.strongest(_STRONG_FRACTION)
         self._search = OffsetSearch(signal, strong, max_offset_hz) if max_offset_hz > 0 else None
         self._weights = self._search.tapers if self._search else np.ones((1, self._periods))
         search_hz = self._search.width_hz if self._search else 0.0
         samples = signal.samples
-        share = detection_share(
+        fraction = detection_threshold(
             false_alarm, len(strong.bins), samples, search_hz, signal.duration_s
         )
-        self._fit = LineFit(signal, lines, strong, share)
+        self._fit = TonePhaseFit(signal, components, strong, fraction)
 
     def estimate(self, bursts: ArrayLike) -> ToneEstimate:
         """Estimate tone phases, offset, amplitude and noise of each burst.

@@ -28,7 +28,7 @@ from scipy.special import jv
 from rail_signals.arrays import ComplexArray, FloatArray
 
 ALIASED_POWER_LIMIT = 1e-8
-"""Largest share of the FM power that may lie past the Nyquist frequency."""
+"""Largest fraction of the FM power that may lie past the Nyquist frequency."""
 
 _MAX_ORDER = 40
 
@@ -134,14 +134,14 @@ class RangingSignal:
         return tuple(round(f * self.period_samples / self.sample_rate_hz) for f in self.tones_hz)
 
     def _aliased_power(self) -> float:
-        """Share of the power in Bessel lines at or past the Nyquist frequency."""
+        """Fraction of the power in Bessel components at or past the Nyquist frequency."""
         order = np.arange(-_MAX_ORDER, _MAX_ORDER + 1)
         frequency = np.zeros(1)
         power = np.ones(1)
         for f, beta in zip(self.tones_hz, self.indices, strict=True):
             frequency = (frequency[:, None] + f * order).ravel()
-            lines = np.asarray(jv(order, beta), dtype=np.float64)
-            power = (power[:, None] * lines**2).ravel()
+            components = np.asarray(jv(order, beta), dtype=np.float64)
+            power = (power[:, None] * components**2).ravel()
         return float(power[np.abs(frequency) >= self.sample_rate_hz / 2].sum())
 
 
@@ -193,7 +193,7 @@ def discriminate(signal: RangingSignal, bursts: ArrayLike) -> FloatArray:
     """Demodulate FM by the classical discriminator: the phase step of each sample.
 
     The source's receiver. It has the FM threshold: below about 10 dB of
-    carrier-to-noise ratio per sample its error leaves the bound (see `LineReceiver`).
+    carrier-to-noise ratio per sample its error leaves the bound (see `FmToneReceiver`).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Fit of tone phases, amplitude and noise to the lines of a folded period."""
+"""Fit of tone phases, amplitude and noise to the components of a folded period."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.phasors import cis
 
-from .fm_spectrum import LineSpectrum
+from .fm_spectrum import FmSpectrum
 from .signal import RangingSignal
 
 _DIRECT_PERIOD = 64
@@ -20,55 +20,57 @@ _FEW = 4
 _TURN = 2 * math.pi
 
 
-class LineFit:
+class TonePhaseFit:
     """One Gauss-Newton step on complex amplitude and tone phases.
 
-    It starts from the products of neighbouring lines. The symmetry of the lines makes the
+    It starts from the products of neighbouring components. The symmetry of the components makes the
     normal matrix diagonal.
 
     Parameters
     ----------
     signal
         The signal.
-    lines, strong
-        Lines to fit, and those of them whose energy tells a signal.
+    components, strong
+        Components to fit, and those of them whose energy tells a signal.
     threshold
-        Share of the energy above which the strong lines count as detected.
+        Fraction of the energy above which the strong components count as detected.
     """
 
     def __init__(
-        self, signal: RangingSignal, lines: LineSpectrum, strong: LineSpectrum, threshold: float
+        self, signal: RangingSignal, components: FmSpectrum, strong: FmSpectrum, threshold: float
     ) -> None:
         samples, period = signal.samples, signal.period_samples
         periods = samples // period
-        tones = lines.orders.shape[1]
+        tones = components.orders.shape[1]
         self._period = period
-        self._bins = lines.bins
-        self._basis = lines.real_basis(period) / periods
+        self._bins = components.bins
+        self._basis = components.real_basis(period) / periods
         self._scale = 1 / samples
-        self._init_forms(lines, strong)
-        self._orders = lines.orders.T.astype(np.float64)
-        information = lines.information
+        self._init_forms(components, strong)
+        self._orders = components.orders.T.astype(np.float64)
+        information = components.information
         self._variance = (0.5 / (samples * information)).tolist()
-        self._curvature = (information / lines.power).tolist()
-        rows = [lines.amplitudes / lines.power]
-        rows += [lines.orders[:, t] * lines.amplitudes / information[t] for t in range(tones)]
+        self._curvature = (information / components.power).tolist()
+        rows = [components.amplitudes / components.power]
+        rows += [
+            components.orders[:, t] * components.amplitudes / information[t] for t in range(tones)
+        ]
         self._fit = np.stack(rows, axis=-1).astype(np.complex128)
-        self._power = lines.power
-        self._misfit_scale = samples / (len(lines.bins) - 1 - tones / 2)
+        self._power = components.power
+        self._chi_square_scale = samples / (len(components.bins) - 1 - tones / 2)
         self._threshold = threshold / samples
         self._noise_scale = 1 / (samples - period)
         self._fold_scale = self._noise_scale / periods
         self._missed = [math.nan] * tones + [math.inf] * tones + [0.0, 0.0, math.nan, math.nan]
 
-    def _init_forms(self, lines: LineSpectrum, strong: LineSpectrum) -> None:
-        """Tables of the quadratic forms of the lines, as pairs of lines and weights.
+    def _init_forms(self, components: FmSpectrum, strong: FmSpectrum) -> None:
+        """Tables of the quadratic forms of the components, as pairs of components and weights.
 
-        Of neighbours in a tone, the conjugate of the upper line times the lower one has the
-        lag of the tone: one form for each. Two more are the energy of all lines and that of
+        Of neighbours in a tone, the conjugate of the upper component times the lower one has the
+        lag of the tone: one form for each. Two more are the energy of all components and that of
         the strong ones.
         """
-        orders = lines.orders.tolist()
+        orders = components.orders.tolist()
         where = {tuple(order): i for i, order in enumerate(orders)}
         tones = len(orders[0])
         self._partner = np.tile(np.arange(len(orders)), (tones + 2, 1))
@@ -78,9 +80,11 @@ class LineFit:
                 lower = where.get((*order[:tone], order[tone] - 1, *order[tone + 1 :]))
                 if lower is not None:
                     self._partner[tone, upper] = lower
-                    self._weight[tone, upper] = lines.amplitudes[upper] * lines.amplitudes[lower]
+                    self._weight[tone, upper] = (
+                        components.amplitudes[upper] * components.amplitudes[lower]
+                    )
         self._weight[-2] = 1.0
-        self._weight[-1] = np.isin(lines.bins, strong.bins)
+        self._weight[-1] = np.isin(components.bins, strong.bins)
 
     def evaluate(
         self, energy: NDArray[Any], offset_hz: FloatArray, folded: ComplexArray, max_snr: float
@@ -103,12 +107,12 @@ class LineFit:
         detected : bool [batch]
             The last.
         """
-        lines = self._lines(folded)
-        products = lines[:, 0].take(self._partner, axis=1)
+        components = self._components(folded)
+        products = components[:, 0].take(self._partner, axis=1)
         products *= self._weight
-        forms = np.vecdot(lines, products)
+        forms = np.vecdot(components, products)
         phase = np.arctan2(forms.imag, forms.real)[:, :-2]
-        fit = (lines * cis(phase[:, None] @ self._orders)) @ self._fit
+        fit = (components * cis(phase[:, None] @ self._orders)) @ self._fit
         parts = folded.view(np.float64)
         columns = (
             energy.astype(np.float64, copy=False),
@@ -118,25 +122,25 @@ class LineFit:
             phase,
             fit.view(np.float64)[:, 0],
         )
-        if len(lines) > _FEW:
-            *fields, detected = self._figures(
+        if len(components) > _FEW:
+            *fields, detected = self._estimates(
                 max_snr, np.maximum, np.sqrt, *(column.T for column in columns)
             )
             table = np.stack(fields, axis=-1)
             table[~detected] = self._missed
             return table, detected
         # Arithmetic with Python's numbers has the same roundings, and less overhead.
-        found = []
+        estimates = []
         for row in zip(*(column.tolist() for column in columns), strict=True):
             try:
-                *figures, seen = self._figures(max_snr, max, math.sqrt, *row)
+                *values, seen = self._estimates(max_snr, max, math.sqrt, *row)
             except (ZeroDivisionError, ValueError):
                 seen = False
-            found.append((figures if seen else self._missed, seen))
-        table = np.array([figures for figures, _ in found])
-        return table, np.array([seen for _, seen in found], dtype=np.bool_)
+            estimates.append((values if seen else self._missed, seen))
+        table = np.array([values for values, _ in estimates])
+        return table, np.array([seen for _, seen in estimates], dtype=np.bool_)
 
-    def _figures(
+    def _estimates(
         self,
         max_snr: float,
         maximum: Callable[[Any, Any], Any],
@@ -161,7 +165,7 @@ class LineFit:
             phase_lag_rad.append((phase - step) % _TURN % _TURN)
             # The step adds to what the fit explains, to second order.
             power = power + slope * step * curvature
-        # Every line is in the folded period, so the energy outside it is noise.
+        # Every component is in the folded period, so the energy outside it is noise.
         outside = energy * self._noise_scale - folded_energy * self._fold_scale
         noise = maximum(outside, power / max_snr)
         snr = power / noise
@@ -171,14 +175,14 @@ class LineFit:
             sqrt(power),
             snr,
             offset_hz,
-            (forms[-2] - power * self._power) * self._misfit_scale / noise,
+            (forms[-2] - power * self._power) * self._chi_square_scale / noise,
             forms[-1] > energy * self._threshold,
         ]
 
-    def _lines(self, folded: ComplexArray) -> ComplexArray:
-        """Lines [batch, 1, lines] of the folded period [batch, 1, period]."""
+    def _components(self, folded: ComplexArray) -> ComplexArray:
+        """Components [batch, 1, components] of the folded period [batch, 1, period]."""
         if self._period <= _DIRECT_PERIOD:
             return (folded.view(np.float64) @ self._basis).view(np.complex128)
-        lines = np.fft.fft(folded).take(self._bins, axis=2)
-        lines *= self._scale
-        return lines
+        components = np.fft.fft(folded).take(self._bins, axis=2)
+        components *= self._scale
+        return components

@@ -77,7 +77,7 @@ def calibrate_delay(
     Parameters
     ----------
     phase_lag_rad : [bursts, tones] or [tones]
-        Two-way lags measured on the bench [rad].
+        Two-way lags measured on the calibration rig [rad].
     variance_rad2 : the same shape
         Their variances [rad^2], the weights of the mean.
     range_m

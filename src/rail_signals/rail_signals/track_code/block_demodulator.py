@@ -57,18 +57,18 @@ class RowFilter:
         self, taps: ComplexArray | FloatArray, decimation: int, outputs: int, real: bool
     ) -> None:
         inputs = outputs * decimation
-        reach = outputs + math.ceil((taps.size - 1) / decimation)
-        index = (np.arange(reach)[None, :] + 1) * decimation - 1 - np.arange(inputs)[:, None]
+        span = outputs + math.ceil((taps.size - 1) / decimation)
+        index = (np.arange(span)[None, :] + 1) * decimation - 1 - np.arange(inputs)[:, None]
         inside = (index >= 0) & (index < taps.size)
         tap = np.where(inside, taps[np.clip(index, 0, taps.size - 1)], 0)
         each = 2 if np.iscomplexobj(taps) else 1
-        parts = np.stack([tap.real, tap.imag][:each], axis=-1).reshape(inputs, each * reach)
+        parts = np.stack([tap.real, tap.imag][:each], axis=-1).reshape(inputs, each * span)
         if not real:
-            turned = np.stack([-tap.imag, tap.real], axis=-1).reshape(inputs, 2 * reach)
-            parts = np.stack([parts, turned], axis=1).reshape(2 * inputs, 2 * reach)
+            turned = np.stack([-tap.imag, tap.real], axis=-1).reshape(inputs, 2 * span)
+            parts = np.stack([parts, turned], axis=1).reshape(2 * inputs, 2 * span)
         self._matrix = np.ascontiguousarray(parts, dtype=np.float32)
         self._width = each * outputs
-        self._spill = math.ceil(reach / outputs) - 1
+        self._spill = math.ceil(span / outputs) - 1
         self.row = self._matrix.shape[0]
         self.reset()
 
@@ -91,7 +91,7 @@ class RowFilter:
         return np.asarray(out.reshape(-1))
 
 
-class FastDemodulator:
+class BlockDemodulator:
     """The chain of `Demodulator` in two steps, each for any number of hops.
 
     Parameters

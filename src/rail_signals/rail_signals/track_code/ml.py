@@ -2,16 +2,17 @@
 
 A discriminator takes the phase of single samples, noise and all, and so has a threshold.
 Here the whole slot is fitted by one wave of constant amplitude whose phase is the model of
-`track_code_bound`: carrier phase, carrier offset and every tone. The residual of each
+`rail_signals.track_code.bound`: carrier phase, carrier offset and every tone. The residual of each
 sample is divided by the carrier before it is used, never turned into an angle, so nothing
 non-linear happens to the noise until all samples are summed.
 
 1. A start. For small indices: products ``z[k+1] conj(z[k])``, of which the angle of the sum
    is the offset, and what is left, as a sine, is the tones plus noise; a sine has no clicks.
    For large ones, where the nominal deviations must be given: recursive least squares that
-   begin in the middle of the slot, or elsewhere, and go outwards (`track_code_ml_start`). Every
-   sample is taken in when the phase there is predicted by those before, as in a phase-locked loop
-   that knows the tones; several beginnings stand in for a search of all phases.
+   begin in the middle of the slot, or elsewhere, and go outwards
+   (`rail_signals.track_code.ml_start`). Every sample is taken in when the phase there is predicted
+   by those before, as in a phase-locked loop that knows the tones; several beginnings stand in for
+   a search of all phases.
 2. Gauss-Newton on the baseband, with the pseudo-inverse of the model's derivatives, which
    depend on the slot only. The covariance of the result is that of
    :func:`rail_signals.track_code.bound.tone_covariance_bound`.
@@ -40,7 +41,7 @@ _OFFSET_HZ = 5.0
 
 
 @dataclass(frozen=True)
-class ToneFit:
+class SlotToneFit:
     """What was fitted to each slot. Leading axes are those of the slots.
 
     Attributes
@@ -175,7 +176,7 @@ class MaximumLikelihoodTones:
             )
             self._variance = tone_sigma_bound(self.tones_hz, 1.0, samples, sample_rate_hz) ** 2
 
-    def estimate(self, baseband: ArrayLike) -> ToneFit:
+    def estimate(self, baseband: ArrayLike) -> SlotToneFit:
         """Fit slots of complex baseband.
 
         Parameters
@@ -185,7 +186,7 @@ class MaximumLikelihoodTones:
         """
         return self._result(baseband, None)
 
-    def refine(self, baseband: ArrayLike, start: ArrayLike) -> ToneFit:
+    def refine(self, baseband: ArrayLike, start: ArrayLike) -> SlotToneFit:
         """Fit slots from a start of one's own, as the slot before gives one.
 
         Parameters
@@ -198,18 +199,18 @@ class MaximumLikelihoodTones:
         """
         return self._result(baseband, np.asarray(start, dtype=np.float64))
 
-    def _result(self, baseband: ArrayLike, start: FloatArray | None) -> ToneFit:
+    def _result(self, baseband: ArrayLike, start: FloatArray | None) -> SlotToneFit:
         """Fit from a given start, or from the receiver's own."""
         z, size = self.scaled(baseband)
         lead = z.shape[:-1]
         z = z.reshape(-1, self.samples)
         if start is not None:
-            found = self.fitted(z, start.reshape(len(z), -1))
+            fitted = self.fitted(z, start.reshape(len(z), -1))
         elif self._search:
-            found = self.search(z)
+            fitted = self.search(z)
         else:
-            found = self.fitted(z, self._first(z))
-        return self.result(found, size.reshape(lead))
+            fitted = self.fitted(z, self._first(z))
+        return self.result(fitted, size.reshape(lead))
 
     def scaled(self, baseband: ArrayLike) -> tuple[ComplexArray, FloatArray]:
         """Slots [..., samples] brought to unit power, and what they had [...], as root.
@@ -225,17 +226,17 @@ class MaximumLikelihoodTones:
         size = np.sqrt(np.mean(z.real**2 + z.imag**2, axis=-1))
         return z / np.where(size > 0, size, 1.0)[..., None], size
 
-    def result(self, found: SlotFit, size: FloatArray) -> ToneFit:
+    def result(self, fitted: SlotFit, size: FloatArray) -> SlotToneFit:
         """Fits as tones, for slots [...] of root-mean-square `size`."""
         lead, tones = size.shape, len(self.tones_hz)
-        parameters, carrier = found.parameters, found.carrier.reshape(lead)
+        parameters, carrier = fitted.parameters, fitted.carrier.reshape(lead)
         amplitudes = parameters[:, 2 : 2 + tones] - 1j * parameters[:, 2 + tones :]
-        return ToneFit(
+        return SlotToneFit(
             amplitudes.reshape(*lead, tones),
             (parameters[:, 1] / (2 * math.pi)).reshape(lead),
             carrier * size,
             carrier,
-            found.plausible.reshape(lead),
+            fitted.plausible.reshape(lead),
         )
 
     def fitted(self, z: ComplexArray, start: FloatArray) -> SlotFit:
@@ -265,8 +266,8 @@ class MaximumLikelihoodTones:
             if best is not None and not fresh:
                 known = best.parameters[open_]
             for outward in starts:
-                found = self.fitted(z[open_], outward.run(unit[open_], known))
-                best = found if best is None else best.with_likelier(open_, found)
+                fitted = self.fitted(z[open_], outward.run(unit[open_], known))
+                best = fitted if best is None else best.with_likelier(open_, fitted)
         assert best is not None
         return best
 
@@ -289,8 +290,8 @@ class MaximumLikelihoodTones:
         Laplace's approximation, with each tone either absent or of its nominal deviation, if
         that is known; whether what this takes away is plausible is the second value.
         """
-        share = np.clip(carrier, 1e-3, 1 - 1e-9) ** 2
-        snr = share / (1 - share)
+        fraction = np.clip(carrier, 1e-3, 1 - 1e-9) ** 2
+        snr = fraction / (1 - fraction)
         likelihood = self.samples * np.log1p(snr)
         if self.deviations_hz is None:
             return np.asarray(likelihood), np.ones(carrier.shape, dtype=np.bool_)

@@ -1,6 +1,6 @@
 """Where a maximum-likelihood fit of a track code begins that knows nothing yet.
 
-See `track_code_ml`: of many starts, the one that followed the phase of the wave wins.
+See `rail_signals.track_code.ml`: of many starts, the one that followed the phase of the wave wins.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 A word lasts for seconds, and its tones go on through all of it. What one slot says about them,
 turned on by the time of a hop, is where the fit of the next one starts; near the truth the
-search of `track_code_ml`, which fails long before the fit does, is not needed. Every slot is
-decided by its own samples: of the fits from the slot before, from the mean of those before,
+search of `rail_signals.track_code.ml`, which fails long before the fit does, is not needed. Every
+slot is decided by its own samples: of the fits from the slot before, from the mean of those before,
 and, where none is plausible, from scratch, the likeliest.
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rail_signals.arrays import ComplexArray, FloatArray
 
-from .ml import MaximumLikelihoodTones, SlotFit, ToneFit
+from .ml import MaximumLikelihoodTones, SlotFit, SlotToneFit
 
 # Weight of the newest slot in the mean. Slots overlap, so that a lesser one would gain little.
 _NEWEST = 0.15
@@ -63,7 +63,7 @@ class TrackedTones:
         self._last: SlotFit | None = None
         self._mean = np.zeros((0, 0))
 
-    def next(self, baseband: ArrayLike) -> ToneFit:
+    def next(self, baseband: ArrayLike) -> SlotToneFit:
         """Fit the next slot of every stream.
 
         Parameters
@@ -73,7 +73,7 @@ class TrackedTones:
 
         Returns
         -------
-        ToneFit
+        SlotToneFit
             ``plausible`` tells which streams are locked.
 
         Raises
@@ -85,18 +85,18 @@ class TrackedTones:
         if z.ndim != 2 or (self._last is not None and len(z) != len(self._mean)):
             raise ValueError(f"baseband must be [streams, samples] as before, got {z.shape}")
         if self._last is None:
-            found = self._fit.search(z)
-            self._mean = found.parameters.copy()
+            fitted = self._fit.search(z)
+            self._mean = fitted.parameters.copy()
         else:
-            before = found = self._fit.fitted(z, self._ahead(self._last.parameters))
+            before = fitted = self._fit.fitted(z, self._ahead(self._last.parameters))
             self._mean = self._ahead(self._mean)
-            found = before.likelier(self._fit.fitted(z, self._mean))
-            lost = np.flatnonzero(~found.plausible)
+            fitted = before.likelier(self._fit.fitted(z, self._mean))
+            lost = np.flatnonzero(~fitted.plausible)
             if lost.size:
-                found = found.with_likelier(lost, self._fit.search(z[lost]))
-            self._average(found)
-        self._last = found
-        return self._fit.result(found, size)
+                fitted = fitted.with_likelier(lost, self._fit.search(z[lost]))
+            self._average(fitted)
+        self._last = fitted
+        return self._fit.result(fitted, size)
 
     def _ahead(self, parameters: FloatArray) -> FloatArray:
         """Parameters of the wave that goes on, about the middle of the next slot."""
@@ -107,16 +107,16 @@ class TrackedTones:
         ahead[:, x], ahead[:, y] = turned.real, -turned.imag
         return ahead
 
-    def _average(self, found: SlotFit) -> None:
+    def _average(self, fitted: SlotFit) -> None:
         """Move the mean towards the slots that hold the same word, or begin it anew."""
         assert self._last is not None
         changed = np.count_nonzero(
-            self._present(found.parameters) != self._present(self._mean), axis=1
+            self._present(fitted.parameters) != self._present(self._mean), axis=1
         )
-        anew = found.plausible & ((changed > _MOST_CHANGED) | ~self._last.plausible)
-        step = found.parameters - self._mean
+        anew = fitted.plausible & ((changed > _MOST_CHANGED) | ~self._last.plausible)
+        step = fitted.parameters - self._mean
         step[:, 0] = (step[:, 0] + math.pi) % (2 * math.pi) - math.pi
-        weight = np.where(anew, 1.0, np.where(found.plausible, _NEWEST, 0.0))
+        weight = np.where(anew, 1.0, np.where(fitted.plausible, _NEWEST, 0.0))
         self._mean += weight[:, None] * step
 
     def _present(self, parameters: FloatArray) -> NDArray[np.bool_]:

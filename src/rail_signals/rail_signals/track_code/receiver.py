@@ -1,9 +1,9 @@
 """The track-code receiver for long inputs: the same decisions, many hops at a time.
 
-The demodulated wave comes from `track_code_fast_demodulator`. Amplitudes, residuals and
-windows of all slots of a batch are then a few matrix products. As long as the word in force
+The demodulated wave comes from `rail_signals.track_code.block_demodulator`. Amplitudes, residuals
+and windows of all slots of a batch are then a few matrix products. As long as the word in force
 goes on, that settles the decisions; every other hop is given to the decision stage of
-`TrackCodeReceiver`, which is not repeated here.
+`ReferenceTrackCodeReceiver`, which is not repeated here.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
 
-from .block_demodulator import FastDemodulator
+from .block_demodulator import BlockDemodulator
 from .decision import MOST_NOISE, Decision, no_slot, read_only
 from .profile import SLOT_RATE_HZ, TrackCodeProfile
 from .reference_receiver import (
     CHANGE_OVER_NOISE,
     LOUDEST,
     MOST_AT_PEAK,
-    TrackCodeReceiver,
+    ReferenceTrackCodeReceiver,
     Word,
     input_fault,
 )
@@ -62,10 +62,10 @@ class _Steady:
     residual_hz: SingleArray
 
 
-class FastTrackCodeReceiver(TrackCodeReceiver):
-    """`TrackCodeReceiver` for long inputs: same parameters, same decisions, less work.
+class TrackCodeReceiver(ReferenceTrackCodeReceiver):
+    """`ReferenceTrackCodeReceiver` for long inputs: same parameters, same decisions, less work.
 
-    The levels differ from those of `TrackCodeReceiver` by about 1e-3, from the finite
+    The levels differ from those of `ReferenceTrackCodeReceiver` by about 1e-3, from the finite
     length of the filters, and in their last digits with the way the input is cut.
     Input in single precision is the fastest.
 
@@ -75,7 +75,7 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
     >>> from rail_signals.track_code.signal import FmTransmitter
     >>> profile = load_profile("tones18")
     >>> wave = FmTransmitter(profile, 2000.0, 6400.0).block(np.arange(18) == 4, 19200)
-    >>> FastTrackCodeReceiver(profile, 2000.0, 6400.0).feed(wave)[-1].fields
+    >>> TrackCodeReceiver(profile, 2000.0, 6400.0).feed(wave)[-1].fields
     {'tone': 4}
     """
 
@@ -97,7 +97,7 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
             confirmations=confirmations,
             least_amplitude=least_amplitude,
         )
-        self._fast_demodulator = FastDemodulator(self.chain, self.hop_samples)
+        self._fast_demodulator = BlockDemodulator(self.chain, self.hop_samples)
         matrix = self._estimator.matrix
         # Amplitudes and residuals of a slot in one product.
         measure = np.concatenate([matrix.real, matrix.imag, self._estimator.whitener])
@@ -119,7 +119,7 @@ class FastTrackCodeReceiver(TrackCodeReceiver):
         self._valid, self._fields = False, None
 
     def feed(self, samples: ArrayLike) -> list[Decision]:
-        """Receive the next samples; as `TrackCodeReceiver.feed`."""
+        """Receive the next samples; as `ReferenceTrackCodeReceiver.feed`."""
         block = np.asarray(samples)
         if block.ndim != 1 or block.dtype.kind != "f":
             return super().feed(block)  # refuses it

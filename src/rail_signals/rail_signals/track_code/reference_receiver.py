@@ -2,8 +2,8 @@
 
 The wave is demodulated (`Demodulator`), and two slots slide over the result at 64 Hz, hop
 by hop. The **long slot** decides: tone levels by least squares (`tone_estimator`), windows,
-check bits and confirmation (`track_code_decision`). The **short slot** notices a change:
-the tones of the word in force, whose phases are known, are continued into it, and what is
+check bits and confirmation (`rail_signals.track_code.decision`). The **short slot** notices a
+change: the tones of the word in force, whose phases are known, are continued into it, and what is
 left over is compared with what noise leaves. When it notices, the word loses its validity at
 once, and a new long slot begins: no decision after that rests on a mixture of two words. A
 change too small to be noticed at first is left to windows, noise, check bits and confirmation.
@@ -28,7 +28,7 @@ from .profile import SLOT_RATE_HZ, TrackCodeProfile
 from .tone_levels import ToneEstimator, tone_columns, tone_estimator
 
 MOST_AT_PEAK = 0.05
-"""Share of samples of a hop that may be at its peak value; an unclipped wave has a few."""
+"""Fraction of samples of a hop that may be at its peak value; an unclipped wave has a few."""
 
 LOUDEST = 1e6
 """Sample magnitude beyond which the input is taken for broken."""
@@ -47,7 +47,7 @@ class Word:
     residual_hz: float
 
 
-class TrackCodeReceiver:
+class ReferenceTrackCodeReceiver:
     """Turns the wave picked up from the rails into decisions, block by block.
 
     The decisions depend on the samples alone and not on how they are cut into blocks:
@@ -79,7 +79,7 @@ class TrackCodeReceiver:
     >>> from rail_signals.track_code.signal import FmTransmitter
     >>> profile = load_profile("tones18")
     >>> wave = FmTransmitter(profile, 2000.0, 6400.0).block(np.arange(18) == 4, 19200)
-    >>> TrackCodeReceiver(profile, 2000.0, 6400.0).feed(wave)[-1].fields
+    >>> ReferenceTrackCodeReceiver(profile, 2000.0, 6400.0).feed(wave)[-1].fields
     {'tone': 4}
     """
 
@@ -114,7 +114,7 @@ class TrackCodeReceiver:
         self._demodulator = Demodulator(self.chain)
         self._confirmation = Confirmation(confirmations)
         # Not that of a subclass, which is not there yet.
-        TrackCodeReceiver.reset(self)
+        ReferenceTrackCodeReceiver.reset(self)
 
     def reset(self) -> None:
         """Forget everything received; the next sample is the first."""

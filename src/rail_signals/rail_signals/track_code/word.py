@@ -124,12 +124,12 @@ def decode(profile: TrackCodeProfile, bits: ArrayLike) -> dict[str, int] | None:
         check = (word & ((1 << degree) - 1)) ^ profile.crc_inversion
         if crc(profile.crc_polynomial, word >> degree) != check:
             return None
-    found: dict[str, int] = {}
+    fields: dict[str, int] = {}
     for name, width in reversed(profile.fields):
         if name != CRC_FIELD:
-            found[name] = word & ((1 << width) - 1)
+            fields[name] = word & ((1 << width) - 1)
         word >>= width
-    return {name: found[name] for name, _ in profile.fields if name != CRC_FIELD}
+    return {name: fields[name] for name, _ in profile.fields if name != CRC_FIELD}
 
 
 def as_number(bits: ArrayLike) -> int:

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from rail_signals.arrays import ComplexArray, FloatArray
 
-from .line_constants import (
+from .cable_constants import (
     capacitance_from_velocity,
     complex_root,
     inductance_from_impedance,

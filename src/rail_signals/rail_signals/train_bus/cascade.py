@@ -20,20 +20,22 @@ from numpy.typing import ArrayLike
 
 from rail_signals.arrays import ComplexArray, FloatArray
 
+from .bus_line import BusLine, CableSection, Coupler, Element, SeriesElement, ShuntElement, Stub
 from .cable import Cable, WaveConstants
-from .line import Coupler, Element, Line, Section, SeriesElement, ShuntElement, Stub
 
 # A section doubles the numbers that describe it; every so often they are made small again.
 _RESCALE = 256
 _SCALE = 2.0**-_RESCALE
 
 
-def input_reflection(line: Line, frequency_hz: ArrayLike, reference_ohm: float) -> ComplexArray:
+def input_reflection(
+    bus_line: BusLine, frequency_hz: ArrayLike, reference_ohm: float
+) -> ComplexArray:
     """Reflection coefficient of the head of a line (S2, 23).
 
     Parameters
     ----------
-    line
+    bus_line
         The line.
     frequency_hz : [frequencies]
         Frequencies above zero [Hz]; zero too where every cable's insulation conducts.
@@ -48,31 +50,31 @@ def input_reflection(line: Line, frequency_hz: ArrayLike, reference_ohm: float) 
     --------
     A quarter wave of 120 ohm makes 144 ohm of 100:
 
-    >>> from rail_signals.train_bus.line import Termination
+    >>> from rail_signals.train_bus.bus_line import Termination
     >>> cable = Cable.from_impedance(120.0, 0.66)
-    >>> line = Line((Section(cable, cable.velocity_m_per_s / 4e6),), Termination(100.0))
+    >>> line = BusLine((CableSection(cable, cable.velocity_m_per_s / 4e6),), Termination(100.0))
     >>> rho = input_reflection(line, [1e6], 100.0)
     >>> round(abs(100 * (1 + rho[0]) / (1 - rho[0])), 6)
     144.0
     """
-    return reflection_at(line, laplace_axis(frequency_hz), reference_ohm)
+    return reflection_at(bus_line, laplace_axis(frequency_hz), reference_ohm)
 
 
-def input_impedance(line: Line, frequency_hz: ArrayLike) -> ComplexArray:
+def input_impedance(bus_line: BusLine, frequency_hz: ArrayLike) -> ComplexArray:
     """Impedance of the head of a line [ohm]; infinite where no current flows."""
-    voltage, current = CascadePass(laplace_axis(frequency_hz)).head(line)
+    voltage, current = CascadePass(laplace_axis(frequency_hz)).head(bus_line)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(current == 0, math.inf, voltage / current))
 
 
 def transfer(
-    line: Line, frequency_hz: ArrayLike, source_ohm: float, load_ends: bool = False
+    bus_line: BusLine, frequency_hz: ArrayLike, source_ohm: float, load_ends: bool = False
 ) -> ComplexArray:
     """Voltages along a line over that which the source would give a matched load.
 
     Parameters
     ----------
-    line
+    bus_line
         The line.
     frequency_hz : [frequencies]
         Frequencies [Hz], as of :func:`input_reflection`.
@@ -87,10 +89,10 @@ def transfer(
         Voltage behind each element and, first, at the head.
     """
     run = CascadePass(laplace_axis(frequency_hz))
-    voltages, currents, decays = run.ports(line)
+    voltages, currents, decays = run.ports(bus_line)
     scale = 2 / (voltages[0] + _positive("source_ohm", source_ohm) * currents[0])
     rows = [scale * voltages[0]]
-    for voltage, decay, element in zip(voltages[1:], decays, line.elements, strict=True):
+    for voltage, decay, element in zip(voltages[1:], decays, bus_line.elements, strict=True):
         if decay is not None:
             scale = scale * decay
         rows.append(scale * voltage)
@@ -99,10 +101,12 @@ def transfer(
     return np.stack(rows)
 
 
-def reflection_at(line: Line, s_rad_per_s: ComplexArray, reference_ohm: float) -> ComplexArray:
+def reflection_at(
+    bus_line: BusLine, s_rad_per_s: ComplexArray, reference_ohm: float
+) -> ComplexArray:
     """Reflection coefficient of the head at complex frequencies s [rad/s]: [frequencies]."""
     reference = _positive("reference_ohm", reference_ohm)
-    voltage, current = CascadePass(s_rad_per_s).head(line)
+    voltage, current = CascadePass(s_rad_per_s).head(bus_line)
     current *= reference
     total = voltage + current
     voltage -= current
@@ -136,12 +140,12 @@ class CascadePass:
         self._stubs: dict[Stub, ComplexArray] = {}
         self._backward, self._decay = np.empty_like(self.s), np.empty_like(self.s)
 
-    def head(self, line: Line) -> tuple[ComplexArray, ComplexArray]:
+    def head(self, bus_line: BusLine) -> tuple[ComplexArray, ComplexArray]:
         """Voltage and current at the head, but for a factor they share."""
-        voltage, current = line.termination.voltage_and_current(self.s)
-        behind: Section | None = None  # if there is one, `current` is Z0 I of this section
-        for count, element in enumerate(reversed(line.elements), 1):
-            if isinstance(element, Section):
+        voltage, current = bus_line.termination.voltage_and_current(self.s)
+        behind: CableSection | None = None  # if there is one, `current` is Z0 I of this section
+        for count, element in enumerate(reversed(bus_line.elements), 1):
+            if isinstance(element, CableSection):
                 self._enter(element, behind, current)
                 self._through(voltage, current, self._decay_of(element, 2.0, self._decay))
                 behind = element
@@ -156,7 +160,7 @@ class CascadePass:
         return voltage, current
 
     def ports(
-        self, line: Line
+        self, bus_line: BusLine
     ) -> tuple[list[ComplexArray], list[ComplexArray], list[ComplexArray | None]]:
         """Voltage and current at every port, and the decay of every element.
 
@@ -168,12 +172,12 @@ class CascadePass:
         decays : list of complex [frequencies] or None
             ``2 exp(-gamma l)`` of each section; None for what has no length.
         """
-        voltage, current = line.termination.voltage_and_current(self.s)
+        voltage, current = bus_line.termination.voltage_and_current(self.s)
         voltages, currents = [voltage], [current]
         decays: list[ComplexArray | None] = []
-        for element in reversed(line.elements):
+        for element in reversed(bus_line.elements):
             voltage, current = voltage.copy(), current.copy()
-            if isinstance(element, Section):
+            if isinstance(element, CableSection):
                 decay = self._decay_of(element, 1.0, np.empty_like(self.s))
                 self._enter(element, None, current)
                 self._through(voltage, current, np.square(decay, out=self._decay))
@@ -206,7 +210,9 @@ class CascadePass:
         decay = decays[0]
         return np.asarray(voltages[1] / voltages[0] * (1.0 if decay is None else decay))
 
-    def _enter(self, section: Section, behind: Section | None, current: ComplexArray) -> None:
+    def _enter(
+        self, section: CableSection, behind: CableSection | None, current: ComplexArray
+    ) -> None:
         """Make the current ``Z0 I`` of a section, in place."""
         factor = section.impedance_factor
         if behind is not None and behind.cable == section.cable:
@@ -217,7 +223,7 @@ class CascadePass:
         if factor != 1:
             current.view(np.float64)[...] *= factor
 
-    def _leave(self, behind: Section | None, current: ComplexArray) -> None:
+    def _leave(self, behind: CableSection | None, current: ComplexArray) -> None:
         """Make it the current again, in place."""
         if behind is not None:
             current *= self.wave(behind.cable).admittance
@@ -250,7 +256,7 @@ class CascadePass:
         else:
             raise TypeError(f"not an element of a line: {element!r}")
 
-    def _decay_of(self, section: Section, times: float, out: ComplexArray) -> ComplexArray:
+    def _decay_of(self, section: CableSection, times: float, out: ComplexArray) -> ComplexArray:
         """``exp(-times gamma l)`` of a section."""
         wave = self.wave(section.cable)
         length = times * section.length_m * section.delay_factor
@@ -270,18 +276,18 @@ def wave_exponential(
     np.tan(tangent, out=tangent)
     size: FloatArray = attenuation * -length_m
     np.exp(size, out=size)
-    share: FloatArray = tangent * tangent
-    share += 1
-    np.divide(size, share, out=share)
-    share *= 2
-    np.subtract(share, size, out=out.real)
-    share *= tangent
-    np.negative(share, out=out.imag)
+    fraction: FloatArray = tangent * tangent
+    fraction += 1
+    np.divide(size, fraction, out=fraction)
+    fraction *= 2
+    np.subtract(fraction, size, out=out.real)
+    fraction *= tangent
+    np.negative(fraction, out=out.imag)
     return out
 
 
-def _stub_line(stub: Stub) -> Line:
-    return Line((stub.section, ShuntElement(0.0, stub.capacitance_f)), stub.load)
+def _stub_line(stub: Stub) -> BusLine:
+    return BusLine((stub.section, ShuntElement(0.0, stub.capacitance_f)), stub.load)
 
 
 def _positive(name: str, value: float) -> float:

@@ -15,8 +15,8 @@ import numpy as np
 
 from rail_signals.arrays import FloatArray
 
+from .bus_line import BusLine, CableSection, Coupler, Element, Stub, Termination
 from .cable import Cable
-from .line import Coupler, Element, Line, Section, Stub, Termination
 
 CUT = 3.0
 """Standard deviations beyond which no part is delivered."""
@@ -116,7 +116,7 @@ class Consist:
         """Where each run begins, and the end [m]: [cars + 1]."""
         return np.concatenate([[0.0], np.cumsum([run.length_m for run in self.runs])])
 
-    def line(self, deviations: Deviations | None = None) -> Line:
+    def bus_line(self, deviations: Deviations | None = None) -> BusLine:
         """The train as built, without what the instrument adds."""
         d = Deviations.none(len(self.runs)) if deviations is None else deviations
         t = self.tolerances
@@ -132,7 +132,7 @@ class Consist:
                 t.impedance_batch * d.impedance_batch + t.impedance * d.impedance[car]
             )
             delay = math.exp(t.delay_batch * d.delay_batch + t.delay * d.delay[car])
-            elements.append(Section(cable, run.length_m, impedance, delay))
+            elements.append(CableSection(cable, run.length_m, impedance, delay))
             if self.node is not None:
                 capacitance = self.node.capacitance_f * (1 + t.node_capacitance * d.node[car])
                 elements.append(replace(self.node, capacitance_f=capacitance))
@@ -143,7 +143,7 @@ class Consist:
         if math.isfinite(load.resistance_ohm):
             resistance = load.resistance_ohm * math.exp(t.termination * d.termination)
             load = replace(load, resistance_ohm=resistance)
-        return Line(tuple(elements), load)
+        return BusLine(tuple(elements), load)
 
 
 @dataclass(frozen=True)

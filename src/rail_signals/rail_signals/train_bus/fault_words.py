@@ -20,7 +20,7 @@ SIZES: Final = {
 
 
 def size_of(finding: Finding) -> float:
-    """Size of a fault, as a ratio where it is a share; NaN where it has none."""
+    """Size of a fault, as a ratio where it is a fraction; NaN where it has none."""
     name, _, _ = SIZES[finding.kind]
     if not name:
         return math.nan

@@ -17,8 +17,16 @@ import math
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+from .bus_line import (
+    BusLine,
+    CableSection,
+    Coupler,
+    Element,
+    SeriesElement,
+    ShuntElement,
+    Termination,
+)
 from .cable import Cable
-from .line import Coupler, Element, Line, Section, SeriesElement, ShuntElement, Termination
 
 KINDS = (
     "open",
@@ -39,10 +47,10 @@ class OpenCircuit:
     place_m: float
     kind = "open"
 
-    def apply(self, line: Line) -> Line:
+    def apply(self, bus_line: BusLine) -> BusLine:
         """Return the line that ends open at the cut."""
-        elements, index = split_at(line, self.place_m)
-        return Line(elements[:index])
+        elements, index = split_at(bus_line, self.place_m)
+        return BusLine(elements[:index])
 
 
 @dataclass(frozen=True)
@@ -53,13 +61,13 @@ class ShortCircuit:
     resistance_ohm: float = 0.0
     kind = "short"
 
-    def apply(self, line: Line) -> Line:
+    def apply(self, bus_line: BusLine) -> BusLine:
         """Return the line with the short across it."""
-        elements, index = split_at(line, self.place_m)
+        elements, index = split_at(bus_line, self.place_m)
         if self.resistance_ohm == 0:
-            return Line(elements[:index], Termination(0.0))
+            return BusLine(elements[:index], Termination(0.0))
         shunt = ShuntElement(1 / self.resistance_ohm)
-        return Line((*elements[:index], shunt, *elements[index:]), line.termination)
+        return BusLine((*elements[:index], shunt, *elements[index:]), bus_line.termination)
 
 
 @dataclass(frozen=True)
@@ -71,7 +79,7 @@ class WaterIngress:
     place_m, length_m
         Start and length of the stretch [m]; it must not reach past an end of its section.
     capacitance_rise
-        Share by which C rises; impedance and velocity fall with its root.
+        Fraction by which C rises; impedance and velocity fall with its root.
     conductance_s_per_m
         Added to G [S/m].
     """
@@ -82,19 +90,19 @@ class WaterIngress:
     conductance_s_per_m: float = 0.0
     kind = "water_ingress"
 
-    def apply(self, line: Line) -> Line:
+    def apply(self, bus_line: BusLine) -> BusLine:
         """Return the line with the wet stretch in it."""
-        first, index = split_at(line, self.place_m)
-        elements, end = split_at(Line(first, line.termination), self.place_m + self.length_m)
+        first, index = split_at(bus_line, self.place_m)
+        elements, end = split_at(BusLine(first, bus_line.termination), self.place_m + self.length_m)
         wet = elements[index]
-        if end != index + 1 or not isinstance(wet, Section):
+        if end != index + 1 or not isinstance(wet, CableSection):
             raise ValueError(f"the wet stretch must lie in one section, got {self}")
         cable = replace(
             wet.cable,
             capacitance_f_per_m=wet.cable.capacitance_f_per_m * (1 + self.capacitance_rise),
             conductance_s_per_m=wet.cable.conductance_s_per_m + self.conductance_s_per_m,
         )
-        return _replaced(Line(elements, line.termination), index, replace(wet, cable=cable))
+        return _replaced(BusLine(elements, bus_line.termination), index, replace(wet, cable=cable))
 
 
 @dataclass(frozen=True)
@@ -106,11 +114,11 @@ class BadSplice:
     inductance_h: float = 0.0
     kind = "bad_splice"
 
-    def apply(self, line: Line) -> Line:
+    def apply(self, bus_line: BusLine) -> BusLine:
         """Return the line with the joint in series."""
-        elements, index = split_at(line, self.place_m)
+        elements, index = split_at(bus_line, self.place_m)
         joint = SeriesElement(self.resistance_ohm, self.inductance_h)
-        return Line((*elements[:index], joint, *elements[index:]), line.termination)
+        return BusLine((*elements[:index], joint, *elements[index:]), bus_line.termination)
 
 
 @dataclass(frozen=True)
@@ -121,10 +129,10 @@ class WrongCable:
     cable: Cable
     kind = "wrong_cable"
 
-    def apply(self, line: Line) -> Line:
+    def apply(self, bus_line: BusLine) -> BusLine:
         """Return the line with the cable replaced; length and tolerances stay."""
-        index, section = _section(line, self.section)
-        return _replaced(line, index, replace(section, cable=self.cable))
+        index, section = _section(bus_line, self.section)
+        return _replaced(bus_line, index, replace(section, cable=self.cable))
 
 
 @dataclass(frozen=True)
@@ -136,9 +144,9 @@ class MissingShieldGround:
     section
         Number of the section.
     impedance_rise
-        Share by which L rises and C falls, and with them the impedance.
+        Fraction by which L rises and C falls, and with them the impedance.
     loss_rise
-        Share by which the resistance rises.
+        Fraction by which the resistance rises.
     noise_factor
         Factor on the standard deviation of the noise of a reflectogram.
     """
@@ -149,9 +157,9 @@ class MissingShieldGround:
     noise_factor: float = 1.0
     kind = "missing_shield_ground"
 
-    def apply(self, line: Line) -> Line:
+    def apply(self, bus_line: BusLine) -> BusLine:
         """Return the line with the section changed."""
-        index, section = _section(line, self.section)
+        index, section = _section(bus_line, self.section)
         cable, rise, loss = section.cable, 1 + self.impedance_rise, 1 + self.loss_rise
         floating = replace(
             cable,
@@ -160,7 +168,7 @@ class MissingShieldGround:
             resistance_ohm_per_m=cable.resistance_ohm_per_m * loss,
             skin_ohm_per_m_sqrt_hz=cable.skin_ohm_per_m_sqrt_hz * loss,
         )
-        return _replaced(line, index, replace(section, cable=floating))
+        return _replaced(bus_line, index, replace(section, cable=floating))
 
 
 @dataclass(frozen=True)
@@ -184,20 +192,20 @@ class LooseConnector:
     spread: float = 0.0
     kind = "loose_connector"
 
-    def apply(self, line: Line) -> Line:
+    def apply(self, bus_line: BusLine) -> BusLine:
         """Return the line with the connector changed."""
-        indices = [i for i, e in enumerate(line.elements) if isinstance(e, Coupler)]
+        indices = [i for i, e in enumerate(bus_line.elements) if isinstance(e, Coupler)]
         if not 0 <= self.coupler < len(indices):
             raise ValueError(f"coupler must be one of {len(indices)}, got {self.coupler!r}")
         index = indices[self.coupler]
-        element = line.elements[index]
+        element = bus_line.elements[index]
         assert isinstance(element, Coupler)
         loose = replace(
             element,
             resistance_ohm=element.resistance_ohm + self.resistance_ohm,
             inductance_h=element.inductance_h + self.inductance_h,
         )
-        return _replaced(line, index, loose)
+        return _replaced(bus_line, index, loose)
 
 
 BusFault: TypeAlias = (
@@ -212,18 +220,18 @@ BusFault: TypeAlias = (
 """Any of the faults."""
 
 
-def place_of(fault: BusFault, line: Line) -> float:
+def place_of(fault: BusFault, bus_line: BusLine) -> float:
     """Where a fault begins [m of cable from the head]: its place, section or coupler."""
     if isinstance(fault, WrongCable | MissingShieldGround):
-        index, _ = _section(line, fault.section)
-        return _start_m(line, index)
+        index, _ = _section(bus_line, fault.section)
+        return _start_m(bus_line, index)
     if isinstance(fault, LooseConnector):
-        indices = [i for i, e in enumerate(line.elements) if isinstance(e, Coupler)]
-        return _start_m(line, indices[fault.coupler])
+        indices = [i for i, e in enumerate(bus_line.elements) if isinstance(e, Coupler)]
+        return _start_m(bus_line, indices[fault.coupler])
     return fault.place_m
 
 
-def split_at(line: Line, place_m: float) -> tuple[tuple[Element, ...], int]:
+def split_at(bus_line: BusLine, place_m: float) -> tuple[tuple[Element, ...], int]:
     """Elements of a line with a boundary at a place, and the number of what lies behind it.
 
     Raises
@@ -231,36 +239,38 @@ def split_at(line: Line, place_m: float) -> tuple[tuple[Element, ...], int]:
     ValueError
         If the place is not within the line.
     """
-    if not (math.isfinite(place_m) and 0 <= place_m <= line.length_m):
-        raise ValueError(f"place_m must lie within 0 and {line.length_m:g} m, got {place_m!r}")
+    if not (math.isfinite(place_m) and 0 <= place_m <= bus_line.length_m):
+        raise ValueError(f"place_m must lie within 0 and {bus_line.length_m:g} m, got {place_m!r}")
     start = 0.0
-    for index, element in enumerate(line.elements):
-        if not isinstance(element, Section):
+    for index, element in enumerate(bus_line.elements):
+        if not isinstance(element, CableSection):
             continue
         inside = place_m - start
         if inside < element.length_m:
             if inside == 0:
-                return line.elements, index
+                return bus_line.elements, index
             parts = (
                 replace(element, length_m=inside),
                 replace(element, length_m=element.length_m - inside),
             )
-            return (*line.elements[:index], *parts, *line.elements[index + 1 :]), index + 1
+            return (*bus_line.elements[:index], *parts, *bus_line.elements[index + 1 :]), index + 1
         start += element.length_m
-    return line.elements, len(line.elements)
+    return bus_line.elements, len(bus_line.elements)
 
 
-def _section(line: Line, number: int) -> tuple[int, Section]:
+def _section(bus_line: BusLine, number: int) -> tuple[int, CableSection]:
     """Index and element of a section by its number."""
-    found = [(i, e) for i, e in enumerate(line.elements) if isinstance(e, Section)]
-    if not 0 <= number < len(found):
-        raise ValueError(f"section must be one of {len(found)}, got {number!r}")
-    return found[number]
+    sections = [(i, e) for i, e in enumerate(bus_line.elements) if isinstance(e, CableSection)]
+    if not 0 <= number < len(sections):
+        raise ValueError(f"section must be one of {len(sections)}, got {number!r}")
+    return sections[number]
 
 
-def _start_m(line: Line, index: int) -> float:
-    return sum(e.length_m for e in line.elements[:index] if isinstance(e, Section))
+def _start_m(bus_line: BusLine, index: int) -> float:
+    return sum(e.length_m for e in bus_line.elements[:index] if isinstance(e, CableSection))
 
 
-def _replaced(line: Line, index: int, element: Element) -> Line:
-    return Line((*line.elements[:index], element, *line.elements[index + 1 :]), line.termination)
+def _replaced(bus_line: BusLine, index: int, element: Element) -> BusLine:
+    return BusLine(
+        (*bus_line.elements[:index], element, *bus_line.elements[index + 1 :]), bus_line.termination
+    )

@@ -158,7 +158,7 @@ class BusFrameFormat:
 
     @cached_property
     def _rise(self) -> FloatArray:
-        """Share of a step that lies before its middle: [samples of a half bit]."""
+        """Fraction of a step that lies before its middle: [samples of a half bit]."""
         each = self.samples_per_bit // 2
         return self.edge(np.arange(each) - each + 0.5)
 
@@ -188,7 +188,7 @@ def checked_payload(bits: BoolArray) -> bytes | None:
 
 
 def bit_error_rate(ebn0: ArrayLike) -> FloatArray:
-    """Share of wrong bits of an antipodal signal in white noise, ``Q(sqrt(2 Eb/N0))`` [...].
+    """Fraction of wrong bits of an antipodal signal in white noise, ``Q(sqrt(2 Eb/N0))`` [...].
 
     A Manchester bit and its opposite are antipodal, so that the matched filter over the bit
     reaches this.
@@ -210,5 +210,5 @@ def bit_error_rate(ebn0: ArrayLike) -> FloatArray:
 
 
 def frame_loss_rate(ebn0: ArrayLike, bits: int) -> FloatArray:
-    """Share of frames with a wrong bit among `bits`, errors independent [...]."""
+    """Fraction of frames with a wrong bit among `bits`, errors independent [...]."""
     return np.asarray(-np.expm1(bits * np.log1p(-bit_error_rate(ebn0))))

@@ -126,22 +126,22 @@ def check_pulse(
 def _reasons(
     test: str, mask: PulseMask, amplitude: float, peak: float, slew: float, rate: float
 ) -> list[str]:
-    found = []
+    reasons = []
     if test == "short":
         if mask.most_short_a is not None and peak > mask.most_short_a:
-            found.append(f"current {peak:.3g} A above {mask.most_short_a:g} A")
-        return found
+            reasons.append(f"current {peak:.3g} A above {mask.most_short_a:g} A")
+        return reasons
     if test == "resistive":
         if amplitude < mask.least_heavy_v:
-            found.append(f"amplitude {amplitude:.3g} V below {mask.least_heavy_v:g} V")
+            reasons.append(f"amplitude {amplitude:.3g} V below {mask.least_heavy_v:g} V")
         if slew < mask.least_slew_v_per_ns:
-            found.append(f"slope {slew:.3g} V/ns below {mask.least_slew_v_per_ns:g} V/ns")
+            reasons.append(f"slope {slew:.3g} V/ns below {mask.least_slew_v_per_ns:g} V/ns")
     elif peak > mask.most_light_v:
-        found.append(f"peak {peak:.3g} V above {mask.most_light_v:g} V")
+        reasons.append(f"peak {peak:.3g} V above {mask.most_light_v:g} V")
     off = rate / mask.bit_rate_hz - 1
     if not math.isfinite(off) or abs(off) > mask.bit_rate_tolerance:
-        found.append(f"bit rate off by {off * 100:.3g} %")
-    return found
+        reasons.append(f"bit rate off by {off * 100:.3g} %")
+    return reasons
 
 
 def _crossings(time: FloatArray, wave: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -41,7 +41,7 @@ class ReceivedFrame:
     ----------
     payload
         Bytes of a frame whose check agrees, None else.
-    found
+    detected
         Whether the start of a frame was found.
     delay_s
         When it begins within the block [s]; NaN if not found.
@@ -54,14 +54,14 @@ class ReceivedFrame:
     """
 
     payload: bytes | None
-    found: bool
+    detected: bool
     delay_s: float
     level: float
     ebn0: float
     bits: BoolArray
 
 
-NOT_FOUND = ReceivedFrame(None, False, math.nan, math.nan, math.nan, np.zeros(0, dtype=np.bool_))
+NOT_DETECTED = ReceivedFrame(None, False, math.nan, math.nan, math.nan, np.zeros(0, dtype=np.bool_))
 """No frame."""
 
 
@@ -120,15 +120,15 @@ class BusFrameReceiver:
         block = np.asarray(samples, dtype=np.float64)
         frame = self.frame
         if block.ndim != 1 or len(block) < frame.samples:
-            return NOT_FOUND
+            return NOT_DETECTED
         largest = float(np.abs(block).max())
         if not 0.0 < largest < _LARGEST:  # NaN compares false
-            return NOT_FOUND
+            return NOT_DETECTED
         padded = np.zeros(len(block) + 2 * _SKIRT)
         np.divide(block, largest, out=padded[_SKIRT:-_SKIRT])
         place = self._find(padded)
         if place is None:
-            return NOT_FOUND
+            return NOT_DETECTED
         whole = round(place)
         pulse = self._pulse(place - whole)
         first = whole + frame.samples - frame.data_bits * frame.samples_per_bit

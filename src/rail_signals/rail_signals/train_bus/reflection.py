@@ -34,14 +34,14 @@ def reflection_coefficient(load_ohm: ArrayLike, impedance_ohm: ArrayLike) -> Com
     [1.0, -1.0, 0.0]
     """
     load = np.asarray(load_ohm, dtype=np.complex128)
-    line = np.asarray(impedance_ohm, dtype=np.complex128)
-    if not np.isfinite(line).all() or (line.real <= 0).any():
+    bus_line = np.asarray(impedance_ohm, dtype=np.complex128)
+    if not np.isfinite(bus_line).all() or (bus_line.real <= 0).any():
         raise ValueError(f"impedance_ohm must be finite and above 0, got {impedance_ohm!r}")
     if np.isnan(load).any() or (load.real < 0).any():
         raise ValueError(f"load_ohm must not be below 0, got {load_ohm!r}")
     is_open = np.isinf(load)
     finite = np.where(is_open, 0.0, load)
-    return np.asarray(np.where(is_open, 1.0, (finite - line) / (finite + line)))
+    return np.asarray(np.where(is_open, 1.0, (finite - bus_line) / (finite + bus_line)))
 
 
 def load_from_reflection(rho: ArrayLike, impedance_ohm: ArrayLike) -> ComplexArray:
@@ -50,10 +50,10 @@ def load_from_reflection(rho: ArrayLike, impedance_ohm: ArrayLike) -> ComplexArr
     A coefficient of exactly 1 is an open end: infinite.
     """
     coefficient = np.asarray(rho, dtype=np.complex128)
-    line = np.asarray(impedance_ohm, dtype=np.complex128)
+    bus_line = np.asarray(impedance_ohm, dtype=np.complex128)
     is_open = coefficient == 1
     rest = np.where(is_open, 1.0, 1 - coefficient)
-    return np.asarray(np.where(is_open, math.inf, line * (1 + coefficient) / rest))
+    return np.asarray(np.where(is_open, math.inf, bus_line * (1 + coefficient) / rest))
 
 
 def return_loss_db(rho: ArrayLike) -> FloatArray:

@@ -15,8 +15,8 @@ from scipy.signal import lfilter
 
 from rail_signals.arrays import FloatArray
 
+from .bus_line import BusLine, CableSection, Element
 from .consist import Consist
-from .line import Element, Line, Section
 
 STEP_M = 1.0
 """Length over which the impedance counts as constant [m]."""
@@ -32,22 +32,22 @@ def draw_roughness(consist: Consist, rng: np.random.Generator) -> FloatArray:
     return np.asarray(t.roughness * lfilter([1.0], [1.0, -keep], drive))
 
 
-def roughened(line: Line, rough: FloatArray) -> Line:
+def roughened(bus_line: BusLine, rough: FloatArray) -> BusLine:
     """A line whose sections follow a drawn roughness.
 
     Parameters
     ----------
-    line
+    bus_line
         The line.
     rough : float64 [metres]
         Logarithm of the impedance over its mean, from the head on; the last goes on.
     """
     if not rough.any():
-        return line
+        return bus_line
     elements: list[Element] = []
     start = 0.0
-    for element in line.elements:
-        if not isinstance(element, Section):
+    for element in bus_line.elements:
+        if not isinstance(element, CableSection):
             elements.append(element)
             continue
         end = start + element.length_m
@@ -65,4 +65,4 @@ def roughened(line: Line, rough: FloatArray) -> Line:
             )
             place = stop
         start = end
-    return Line(tuple(elements), line.termination)
+    return BusLine(tuple(elements), bus_line.termination)

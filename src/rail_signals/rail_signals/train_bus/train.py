@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from .bus_line import CableSection, Coupler, Stub, Termination
 from .consist import CarRun, Consist
-from .line import Coupler, Section, Stub, Termination
 from .profile import BusProfile, load_bus_profile
 
 STUB_M: Final = 0.3
@@ -52,7 +52,7 @@ def train_consist(cars: Sequence[str]) -> Consist:
     121.0
     """
     profiles = train_profiles(cars)
-    node = Stub(Section(profiles[0].cable, STUB_M), NODE_LOAD, NODE_CAPACITANCE_F)
+    node = Stub(CableSection(profiles[0].cable, STUB_M), NODE_LOAD, NODE_CAPACITANCE_F)
     return Consist(_runs(profiles), node, COUPLER, Termination(profiles[0].termination_ohm))
 
 

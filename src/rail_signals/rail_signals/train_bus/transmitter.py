@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from rail_signals.arrays import FloatArray
 
-from .line import Termination
+from .bus_line import Termination
 
 BIT_RATE_HZ = 1e6
 """Bits per second of the bus."""
@@ -35,7 +35,7 @@ class TestLoads:
     ----------
     terminator_ohm
         Terminator Rt [ohm].
-    resistive_share
+    resistive_fraction
         Terminator and resistor together, over Rt.
     idle_ohm, idle_f
         Resistor [ohm] and capacitor [F] in series, in place of the terminator.
@@ -46,7 +46,7 @@ class TestLoads:
     __test__ = False  # not a class of tests
 
     terminator_ohm: float = 120.0
-    resistive_share: float = 0.42
+    resistive_fraction: float = 0.42
     idle_ohm: float = 27.0
     idle_f: float = 1.3e-9
     idle_ohm_tolerance: float = 0.01
@@ -58,13 +58,13 @@ class TestLoads:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} must be above 0, got {value!r}")
-        if not 0 < self.resistive_share < 1:
-            raise ValueError(f"resistive_share must be below 1, got {self.resistive_share!r}")
+        if not 0 < self.resistive_fraction < 1:
+            raise ValueError(f"resistive_share must be below 1, got {self.resistive_fraction!r}")
 
     @property
     def external_ohm(self) -> float:
         """Resistor that beside the terminator makes the resistive load [ohm]."""
-        return self.terminator_ohm * self.resistive_share / (1 - self.resistive_share)
+        return self.terminator_ohm * self.resistive_fraction / (1 - self.resistive_fraction)
 
     @property
     def idle_time_constant_s(self) -> float:
@@ -82,7 +82,7 @@ class TestLoads:
         if test == "open":
             return Termination(self.terminator_ohm)
         if test == "resistive":
-            return Termination(self.terminator_ohm * self.resistive_share)
+            return Termination(self.terminator_ohm * self.resistive_fraction)
         if test == "idle":
             return Termination(self.idle_ohm, self.idle_f)
         if test == "short":

@@ -30,7 +30,11 @@ from .symbol_mapping import BitArray, Constellation
 
 
 def noise_variance(
-    eb_n0_db: float, bits_per_symbol: int, *, channel_power: float = 1.0, pilot_share: float = 0.0
+    eb_n0_db: float,
+    bits_per_symbol: int,
+    *,
+    channel_power: float = 1.0,
+    pilot_fraction: float = 0.0,
 ) -> float:
     """Noise variance N0 per complex sample of each receive antenna for a given Eb/N0.
 
@@ -42,7 +46,7 @@ def noise_variance(
         Bits per data symbol.
     channel_power
         Mean power P of the gain between two antennas.
-    pilot_share
+    pilot_fraction
         0 if Eb counts the energy of data symbols alone, `PilotPattern.pilot_share` if the energy
         of the pilots is shared out among the bits.
 
@@ -57,9 +61,9 @@ def noise_variance(
         raise ValueError(f"bits_per_symbol must be 1 or more, got {bits_per_symbol!r}")
     if not (math.isfinite(channel_power) and channel_power > 0):
         raise ValueError(f"channel_power must be finite and above zero, got {channel_power!r}")
-    if not 0 <= pilot_share < 1:
-        raise ValueError(f"pilot_share must lie from 0 to below 1, got {pilot_share!r}")
-    energy_per_bit = channel_power / (bits_per_symbol * (1 - pilot_share))
+    if not 0 <= pilot_fraction < 1:
+        raise ValueError(f"pilot_share must lie from 0 to below 1, got {pilot_fraction!r}")
+    energy_per_bit = channel_power / (bits_per_symbol * (1 - pilot_fraction))
     return float(energy_per_bit / 10 ** (eb_n0_db / 10))
 
 
@@ -82,8 +86,8 @@ def root_raised_cosine(rolloff: float, samples_per_symbol: int, span_symbols: in
         raise ValueError(f"samples_per_symbol must be 2 or more, got {samples_per_symbol!r}")
     if span_symbols < 1:
         raise ValueError(f"span_symbols must be 1 or more, got {span_symbols!r}")
-    reach = span_symbols * samples_per_symbol
-    t = np.arange(-reach, reach + 1) / samples_per_symbol
+    half_span = span_symbols * samples_per_symbol
+    t = np.arange(-half_span, half_span + 1) / samples_per_symbol
     # The closed form is 0 / 0 at the middle and at a quarter of 1 / rolloff: limits there.
     pole = np.abs(np.abs(4 * rolloff * t) - 1) < 1e-9
     safe = np.where(pole | (t == 0), 0.123, t)
@@ -345,4 +349,4 @@ _LARGEST = 1e100
 """Samples beyond it would overflow when squared."""
 
 _LEAST_NOISE = 1e-9
-"""Least share of the power that counts as noise, so that no SNR is infinite."""
+"""Least fraction of the power that counts as noise, so that no SNR is infinite."""

@@ -80,7 +80,7 @@ def amplitude_gain(loss_db: ArrayLike) -> FloatArray:
     return np.asarray(10.0 ** (-np.asarray(loss_db, dtype=np.float64) / 20))
 
 
-class Section(Protocol):
+class PathLossSection(Protocol):
     """A stretch of line that adds to the loss of a link."""
 
     def loss_db(self, mast_m: ArrayLike, train_m: ArrayLike) -> FloatArray:
@@ -175,7 +175,7 @@ class Tunnel:
 
 
 def section_loss_db(
-    sections: Sequence[Section], mast_m: ArrayLike, train_m: ArrayLike
+    sections: Sequence[PathLossSection], mast_m: ArrayLike, train_m: ArrayLike
 ) -> FloatArray:
     """Sum of the losses of sections on a link.
 
@@ -202,8 +202,8 @@ def _risen(chainage_m: ArrayLike, edge_at_m: float, width_m: float) -> FloatArra
     beyond = _finite(chainage_m) - edge_at_m
     if width_m == 0:
         return np.where(beyond >= 0, 1.0, 0.0)
-    share = np.clip(beyond / width_m + 0.5, 0.0, 1.0)
-    return np.asarray((1 - np.cos(math.pi * share)) / 2)
+    fraction = np.clip(beyond / width_m + 0.5, 0.0, 1.0)
+    return np.asarray((1 - np.cos(math.pi * fraction)) / 2)
 
 
 def _finite(chainage_m: ArrayLike) -> FloatArray:

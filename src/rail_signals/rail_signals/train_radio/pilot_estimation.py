@@ -88,8 +88,8 @@ class PilotPattern:
         return self.data_symbols + (self._stretches + 1) * self.block
 
     @property
-    def pilot_share(self) -> float:
-        """Share of the energy of a burst that the pilots take."""
+    def pilot_fraction(self) -> float:
+        """Fraction of the energy of a burst that the pilots take."""
         return 1 - self.data_symbols / self.symbols
 
     @cached_property
@@ -234,7 +234,7 @@ class WienerEstimator:
         return np.asarray(np.ascontiguousarray(parts).view(np.complex128).reshape(shape))
 
     def error_variance(self, snr: ArrayLike) -> FloatArray:
-        """Predicted error variance of `estimate` as a share of the channel power.
+        """Predicted error variance of `estimate` as a fraction of the channel power.
 
         It holds for a channel of the Doppler of this estimator.
 

@@ -65,7 +65,7 @@ class Scheme:
 
     @property
     def antenna_power(self) -> float:
-        """Share of the transmit power that each antenna sends."""
+        """Fraction of the transmit power that each antenna sends."""
         return 1.0 / self.transmit
 
     @property
@@ -111,7 +111,7 @@ class Scheme:
         ----------
         received : complex [..., rx, n]
         channel : complex [..., rx, tx, n]
-            Gains h, without the share of power of an antenna. Leading axes broadcast.
+            Gains h, without the fraction of power of an antenna. Leading axes broadcast.
 
         Returns
         -------
@@ -156,7 +156,7 @@ class Scheme:
 def _alamouti(
     y: ComplexArray, h: ComplexArray, power: FloatArray
 ) -> tuple[ComplexArray, FloatArray]:
-    """Sums of eq. 8 [..., n] and the weights they carry, before the share of power."""
+    """Sums of eq. 8 [..., n] and the weights they carry, before the fraction of power."""
     y1, y2 = y[..., 0::2], y[..., 1::2].conj()
     early, late = h[..., 0::2], h[..., 1::2]
     x1 = np.sum(early[..., 0, :].conj() * y1 + late[..., 1, :] * y2, axis=-2)

@@ -18,7 +18,7 @@ MOST_TOGETHER = 6
 
 
 @dataclass(frozen=True)
-class Candidate:
+class TrainCandidate:
     """A train, and the readings that can be its own.
 
     Parameters
@@ -35,50 +35,50 @@ class Candidate:
     misses: Mapping[int, float]
 
 
-class LineOrder:
+class RunningOrder:
     """Which of two trains is ahead; on one track that never changes."""
 
     def __init__(self) -> None:
         self._ahead: dict[tuple[int, int], bool] = {}
 
-    def learn(self, rear: int, front: int, way_m: float | None) -> None:
-        """Take note of the way from one train to another, both seen at once.
+    def learn(self, rear: int, front: int, distance_m: float | None) -> None:
+        """Take note of the distance from one train to another, both seen at once.
 
         None says that the two cannot reach each other in one direction.
         """
-        if way_m is None:
+        if distance_m is None:
             self._ahead.pop((rear, front), None)
             self._ahead.pop((front, rear), None)
-        elif way_m != 0.0:
-            self._ahead[rear, front] = way_m > 0.0
-            self._ahead[front, rear] = way_m < 0.0
+        elif distance_m != 0.0:
+            self._ahead[rear, front] = distance_m > 0.0
+            self._ahead[front, rear] = distance_m < 0.0
 
-    def allows(self, one: int, other: int, way_m: float | None) -> bool:
+    def allows(self, one: int, other: int, distance_m: float | None) -> bool:
         """Whether ``other`` can be that far ahead of ``one`` (negative: behind)."""
         known = self._ahead.get((one, other))
-        return known is None or way_m is None or (way_m > 0.0) == known
+        return known is None or distance_m is None or (distance_m > 0.0) == known
 
 
 def associate(
-    candidates: Sequence[Candidate],
-    ways_m: Mapping[tuple[int, int], float | None],
-    order: LineOrder,
+    candidates: Sequence[TrainCandidate],
+    distances_m: Mapping[tuple[int, int], float | None],
+    order: RunningOrder,
 ) -> dict[int, int]:
     """Give readings to trains.
 
     Parameters
     ----------
-    candidates : sequence of Candidate
-    ways_m : mapping
-        Way along the line from one reading to another [m]; None where there is none.
-    order : LineOrder
+    candidates : sequence of TrainCandidate
+    distances_m : mapping
+        Distance along the line from one reading to another [m]; None where there is none.
+    order : RunningOrder
 
     Returns
     -------
     dict of train to reading; trains and readings that cannot be told are missing.
     """
     owners: dict[int, int] = {}
-    taken: set[int] = set()
+    assigned: set[int] = set()
     offers = sorted(
         (miss, one.train, reading)
         for one in candidates
@@ -86,9 +86,9 @@ def associate(
         for reading, miss in one.misses.items()
     )
     for _, train, reading in offers:
-        if train not in owners and reading not in taken:
+        if train not in owners and reading not in assigned:
             owners[train] = reading
-            taken.add(reading)
+            assigned.add(reading)
     lost = []
     for one in candidates:
         if one.train in owners or one.followed:
@@ -96,18 +96,18 @@ def associate(
         free = [
             reading
             for reading in one.misses
-            if reading not in taken
+            if reading not in assigned
             and all(
-                order.allows(one.train, train, ways_m.get((reading, theirs)))
+                order.allows(one.train, train, distances_m.get((reading, theirs)))
                 for train, theirs in owners.items()
             )
         ]
         if free:
             lost.append((one.train, free))
     for group in _confusable(lost):
-        found = _only_way(group, ways_m, order)
-        if found is not None:
-            owners.update(found)
+        matching = _only_matching(group, distances_m, order)
+        if matching is not None:
+            owners.update(matching)
     return owners
 
 
@@ -127,25 +127,25 @@ def _confusable(lost: list[tuple[int, list[int]]]) -> list[list[tuple[int, list[
     return [members for _, members in groups]
 
 
-def _only_way(
+def _only_matching(
     group: list[tuple[int, list[int]]],
-    ways_m: Mapping[tuple[int, int], float | None],
-    order: LineOrder,
+    distances_m: Mapping[tuple[int, int], float | None],
+    order: RunningOrder,
 ) -> dict[int, int] | None:
     """Return the one way to give every reading of a group to a train, None if not just one."""
     readings = sorted({reading for _, free in group for reading in free})
     if len(readings) != len(group) or len(group) > MOST_TOGETHER:
         return None
-    ways = _matchings(group, {}, ways_m, order)
-    found = next(ways, None)
-    return found if found is not None and next(ways, None) is None else None
+    matchings = _matchings(group, {}, distances_m, order)
+    matching = next(matchings, None)
+    return matching if matching is not None and next(matchings, None) is None else None
 
 
 def _matchings(
     group: Sequence[tuple[int, list[int]]],
     owners: dict[int, int],
-    ways_m: Mapping[tuple[int, int], float | None],
-    order: LineOrder,
+    distances_m: Mapping[tuple[int, int], float | None],
+    order: RunningOrder,
 ) -> Iterator[dict[int, int]]:
     if not group:
         yield dict(owners)
@@ -155,7 +155,7 @@ def _matchings(
         if reading in owners.values():
             continue
         if all(
-            order.allows(train, other, ways_m.get((reading, theirs)))
+            order.allows(train, other, distances_m.get((reading, theirs)))
             for other, theirs in owners.items()
         ):
-            yield from _matchings(group[1:], {**owners, train: reading}, ways_m, order)
+            yield from _matchings(group[1:], {**owners, train: reading}, distances_m, order)

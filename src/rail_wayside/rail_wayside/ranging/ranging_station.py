@@ -10,27 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_signals.ranging.comparators import and_comparator
-from rail_signals.ranging.interference import JAMMING_LIMIT_DB, MISFIT_LIMIT, second_signal
+from rail_signals.ranging.interference import CHI_SQUARE_LIMIT, JAMMING_LIMIT_DB, second_signal
 from rail_signals.ranging.phase_range import (
     phase_to_range_m,
     range_per_radian_m,
     two_tone_range_m,
     unambiguous_range_m,
 )
-from rail_signals.ranging.receiver import LineReceiver, ToneEstimate
+from rail_signals.ranging.receiver import FmToneReceiver, ToneEstimate
 from rail_signals.ranging.signal import RangingSignal, discriminate, tone_of
 
 Comparator = Literal["and", "quadrature", "two_tone"]
 
-#: Where the noise is that of a jammer, or of a signal whose carrier lies far off, less misfit is
-#: enough to tell a second signal.
-JAMMED_MISFIT_LIMIT = 2.5
+#: Where the noise is that of a jammer, or of a signal whose carrier lies far off, a smaller reduced
+#: chi-square is enough to tell a second signal.
+JAMMED_CHI_SQUARE_LIMIT = 2.5
 
 _GRID = 64  # samples per tone period in front of the AND gate
 
 
 @dataclass(frozen=True)
-class Reading:
+class BurstReading:
     """One range with its variance; infinite or NaN as in ``rail_msgs_py.ranging.range_reading``."""
 
     range_m: float
@@ -38,7 +38,7 @@ class Reading:
     disturbance: str = ""
 
 
-NOTHING_HEARD = Reading(math.inf, math.inf)
+NO_SIGNAL = BurstReading(math.inf, math.inf)
 
 
 class RangingStation:
@@ -69,7 +69,7 @@ class RangingStation:
         self.signal = signal
         self.comparator = comparator
         self._delay_s = delay_s
-        self._receiver = LineReceiver(signal)
+        self._receiver = FmToneReceiver(signal)
         self._per_radian_m = range_per_radian_m(signal.tones_hz[0])
         self._noise_factor = 1.0 + downlink_noise
         self._jamming_mw = noise_mw * 10.0 ** (JAMMING_LIMIT_DB / 10.0)
@@ -84,27 +84,29 @@ class RangingStation:
         span_m = unambiguous_range_m(self.signal.tones_hz[-1], "quadrature")
         return -0.05 * span_m, 0.95 * span_m
 
-    def read(self, burst: NDArray[np.complex128]) -> Reading:
+    def read(self, burst: NDArray[np.complex128]) -> BurstReading:
         """Range of one burst [samples], sqrt(mW)."""
         estimate = self._receiver.estimate(burst)
         if not estimate.detected:
             noise_mw = float(np.vdot(burst, burst).real) / burst.size
             if noise_mw > self._jamming_mw:
-                return Reading(math.nan, math.inf, _jammed(noise_mw))
-            return NOTHING_HEARD
+                return BurstReading(math.nan, math.inf, _jammed(noise_mw))
+            return NO_SIGNAL
         amplitude = float(estimate.amplitude)
         noise_mw = amplitude**2 / float(estimate.snr)
         jammed = noise_mw > self._jamming_mw
-        limit = JAMMED_MISFIT_LIMIT if jammed else MISFIT_LIMIT
-        if second_signal(float(estimate.misfit), float(estimate.snr), burst.size, limit):
-            return Reading(math.nan, math.inf, "more than one signal in the zone")
+        limit = JAMMED_CHI_SQUARE_LIMIT if jammed else CHI_SQUARE_LIMIT
+        if second_signal(
+            float(estimate.reduced_chi_square), float(estimate.snr), burst.size, limit
+        ):
+            return BurstReading(math.nan, math.inf, "more than one signal in the zone")
         range_m, variance_m2 = self._compare(estimate, burst)
         if math.isnan(range_m):
-            return Reading(math.nan, math.inf, "too weak to tell the cycle of the tone")
+            return BurstReading(math.nan, math.inf, "too weak to tell the cycle of the tone")
         if jammed:
             # The variance says what the jammer costs; that there is one is said as well.
-            return Reading(range_m, variance_m2, _jammed(noise_mw))
-        return Reading(range_m, variance_m2)
+            return BurstReading(range_m, variance_m2, _jammed(noise_mw))
+        return BurstReading(range_m, variance_m2)
 
     def _compare(
         self, estimate: ToneEstimate, burst: NDArray[np.complex128]

@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from .association import FOLLOWED_S, Candidate, LineOrder, associate
+from .association import FOLLOWED_S, RunningOrder, TrainCandidate, associate
 from .zone_map import ZoneMap
 
 MAX_ACCELERATION_MPS2 = 2.0
@@ -27,18 +27,18 @@ ACCELERATION_SIGMA_MPS2 = 0.7
 
 
 @dataclass(frozen=True)
-class Reading:
+class ZoneReading:
     """A range in a zone; NaN = a signal that cannot be read, inf = none."""
 
     range_m: float
     variance_m2: float
 
 
-NOT_HEARD = Reading(math.inf, math.inf)
+NO_READING = ZoneReading(math.inf, math.inf)
 
 
 @dataclass(frozen=True)
-class Fix:
+class TrainFix:
     """Where a train is. Infinite variance: not known, the chainage is the last that was."""
 
     train: str
@@ -52,7 +52,7 @@ class Fix:
 
 
 @dataclass
-class _Train:
+class _TrackedTrain:
     name: str
     zone: str
     chainage_m: float
@@ -65,12 +65,12 @@ class _Train:
     p_sv: float = 0.0
     p_vv: float = 0.0
     filtered_m: float = 0.0
-    fix: Fix | None = None
+    fix: TrainFix | None = None
     unknown: str = field(default="not on the line yet")
 
 
 @dataclass(frozen=True)
-class _Place:
+class _ReadingPlace:
     zone: str
     chainage_m: float
     variance_m2: float
@@ -88,24 +88,26 @@ class ZoneTracker:
 
     def __init__(self, zone_map: ZoneMap, trains: Sequence[tuple[str, str]]) -> None:
         self._map = zone_map
-        self._trains = [_Train(name, zone, zone_map.zones[zone].start_m) for name, zone in trains]
-        self._order = LineOrder()
+        self._trains = [
+            _TrackedTrain(name, zone, zone_map.zones[zone].start_m) for name, zone in trains
+        ]
+        self._order = RunningOrder()
         self.unidentified: tuple[str, ...] = ()
         self.disturbed: tuple[str, ...] = ()
 
-    def update(self, time_s: float, readings: Mapping[str, Reading]) -> list[Fix]:
+    def update(self, time_s: float, readings: Mapping[str, ZoneReading]) -> list[TrainFix]:
         """Fixes of all trains from the readings [zone] of one tick."""
-        places: list[_Place] = []
+        places: list[_ReadingPlace] = []
         disturbed: list[str] = []
         for name, reading in readings.items():
-            if reading is NOT_HEARD:
+            if reading is NO_READING:
                 continue
             if math.isnan(reading.range_m):
                 disturbed.append(name)
             elif math.isfinite(reading.range_m):
-                found = self._map.zones[name].locate(reading.range_m, reading.variance_m2)
-                if found is not None:
-                    places.append(_Place(name, *found))
+                located = self._map.zones[name].locate(reading.range_m, reading.variance_m2)
+                if located is not None:
+                    places.append(_ReadingPlace(name, *located))
         self.disturbed = tuple(disturbed)
         owners = self._assign(time_s, places)
         self.unidentified = tuple(
@@ -120,29 +122,31 @@ class ZoneTracker:
             fixes.append(self._fix(train, index in owners, shared, readings))
         return fixes
 
-    def _assign(self, time_s: float, places: Sequence[_Place]) -> dict[int, int]:
+    def _assign(self, time_s: float, places: Sequence[_ReadingPlace]) -> dict[int, int]:
         """Index of the place of each train."""
-        candidates: list[Candidate] = []
+        candidates: list[TrainCandidate] = []
         due: set[str] = set()
         for index, train in enumerate(self._trains):
             if train.entered:
                 misses = self._misses(train, time_s, places)
                 followed = time_s - train.seen_s <= FOLLOWED_S
-                candidates.append(Candidate(index, followed, misses))
+                candidates.append(TrainCandidate(index, followed, misses))
             elif train.zone not in due:
                 # Trains that are due at a zone enter there in their order.
                 due.add(train.zone)
                 here = (n for n, place in enumerate(places) if place.zone == train.zone)
-                candidates.append(Candidate(index, False, dict.fromkeys(here, 0.0)))
-        ways_m = {
-            (one, other): self._way_m(places[one], places[other])
+                candidates.append(TrainCandidate(index, False, dict.fromkeys(here, 0.0)))
+        distances_m = {
+            (one, other): self._path_distance_m(places[one], places[other])
             for one in range(len(places))
             for other in range(len(places))
             if one != other
         }
-        return associate(candidates, ways_m, self._order)
+        return associate(candidates, distances_m, self._order)
 
-    def _misses(self, train: _Train, time_s: float, places: Sequence[_Place]) -> dict[int, float]:
+    def _misses(
+        self, train: _TrackedTrain, time_s: float, places: Sequence[_ReadingPlace]
+    ) -> dict[int, float]:
         """How far each place in reach is from where the train is expected, over what it may be."""
         elapsed_s = time_s - train.seen_s
         expected_m = train.speed_mps * elapsed_s
@@ -151,31 +155,33 @@ class ZoneTracker:
         gate_m = min(gate_m, GATE_M + MAX_SPEED_MPS * elapsed_s)
         misses: dict[int, float] = {}
         for number, place in enumerate(places):
-            way_m = self._map.way_m(train.zone, train.filtered_m, place.zone, place.chainage_m)
-            if way_m is None:
+            distance_m = self._map.path_distance_m(
+                train.zone, train.filtered_m, place.zone, place.chainage_m
+            )
+            if distance_m is None:
                 continue
-            miss_m = abs(way_m - expected_m)
+            miss_m = abs(distance_m - expected_m)
             slack_m = gate_m + SIGMAS * math.sqrt(place.variance_m2)
             if miss_m <= slack_m:
                 misses[number] = miss_m / slack_m
         return misses
 
-    def _way_m(self, one: _Place, other: _Place) -> float | None:
-        return self._map.way_m(one.zone, one.chainage_m, other.zone, other.chainage_m)
+    def _path_distance_m(self, one: _ReadingPlace, other: _ReadingPlace) -> float | None:
+        return self._map.path_distance_m(one.zone, one.chainage_m, other.zone, other.chainage_m)
 
-    def _learn_order(self, owners: Mapping[int, int], places: Sequence[_Place]) -> None:
+    def _learn_order(self, owners: Mapping[int, int], places: Sequence[_ReadingPlace]) -> None:
         """Take note of who is ahead of whom among the trains seen now."""
         seen = sorted(owners)
         for position, one in enumerate(seen):
             for other in seen[position + 1 :]:
                 here, there = places[owners[one]], places[owners[other]]
-                way_m = self._way_m(here, there)
+                distance_m = self._path_distance_m(here, there)
                 zones = self._map.zones
-                if way_m is None and zones[here.zone].track == zones[there.zone].track:
+                if distance_m is None and zones[here.zone].track == zones[there.zone].track:
                     continue  # out of sight of each other, in an order that stays
-                self._order.learn(one, other, way_m)
+                self._order.learn(one, other, distance_m)
 
-    def _follow(self, train: _Train, time_s: float, place: _Place) -> None:
+    def _follow(self, train: _TrackedTrain, time_s: float, place: _ReadingPlace) -> None:
         """Step the train's filter on (chainage, speed) with a new place."""
         if not train.entered:
             train.entered = True
@@ -185,14 +191,16 @@ class ZoneTracker:
             elapsed_s = time_s - train.seen_s
             if elapsed_s > FOLLOWED_S:
                 train.regained_s = time_s
-            way_m = self._map.way_m(train.zone, train.filtered_m, place.zone, place.chainage_m)
-            assert way_m is not None
+            distance_m = self._map.path_distance_m(
+                train.zone, train.filtered_m, place.zone, place.chainage_m
+            )
+            assert distance_m is not None
             noise = ACCELERATION_SIGMA_MPS2**2
             train.p_ss += elapsed_s * (2.0 * train.p_sv + elapsed_s * train.p_vv)
             train.p_ss += 0.25 * noise * elapsed_s**4
             train.p_sv += elapsed_s * train.p_vv + 0.5 * noise * elapsed_s**3
             train.p_vv += noise * elapsed_s**2
-            innovation_m = way_m - train.speed_mps * elapsed_s
+            innovation_m = distance_m - train.speed_mps * elapsed_s
             total = train.p_ss + place.variance_m2
             gain_s, gain_v = train.p_ss / total, train.p_sv / total
             # The filtered place lies short of the reading by the part that is not believed.
@@ -204,7 +212,7 @@ class ZoneTracker:
             train.p_ss *= 1.0 - gain_s
         train.seen_s = time_s
         train.chainage_m = place.chainage_m
-        train.fix = Fix(
+        train.fix = TrainFix(
             train.name,
             place.zone,
             self._map.zones[place.zone].track,
@@ -214,8 +222,8 @@ class ZoneTracker:
             train.p_vv,
         )
 
-    def _shared_zones(self, owners: Mapping[int, int], places: Sequence[_Place]) -> set[str]:
-        """Zones in which two trains were last seen, one of which is not heard alone."""
+    def _shared_zones(self, owners: Mapping[int, int], places: Sequence[_ReadingPlace]) -> set[str]:
+        """Zones in which two trains were last seen, one of which is not received alone."""
         seen: dict[str, int] = {}
         for index, train in enumerate(self._trains):
             if train.entered:
@@ -224,10 +232,14 @@ class ZoneTracker:
         return {zone for zone, count in seen.items() if count > 1}
 
     def _fix(
-        self, train: _Train, found: bool, shared: set[str], readings: Mapping[str, Reading]
-    ) -> Fix:
+        self,
+        train: _TrackedTrain,
+        located: bool,
+        shared: set[str],
+        readings: Mapping[str, ZoneReading],
+    ) -> TrainFix:
         zone = self._map.zones[train.zone]
-        if found and train.fix is not None:
+        if located and train.fix is not None:
             reading = readings[train.zone]
             outside_m = train.fix.chainage_m - zone.end_m
             if outside_m > 0.5 * zone.length_m:
@@ -250,8 +262,8 @@ class ZoneTracker:
         elif train.chainage_m > zone.end_m + 0.5 * zone.length_m:
             reason = f"lost {self._beyond(train.zone)}"
         else:
-            reason = f"not heard in {train.zone}"
-        return Fix(
+            reason = f"not received in {train.zone}"
+        return TrainFix(
             train.name,
             train.zone,
             zone.track,
@@ -268,20 +280,20 @@ class ZoneTracker:
         silent = f"{' and '.join(sites)} does not answer" if sites else "the line ends there"
         return f"past the end of {zone}: {silent}"
 
-    def _disturbed_near(self, train: _Train) -> str | None:
+    def _disturbed_near(self, train: _TrackedTrain) -> str | None:
         """Name a disturbed zone that the train may be in, None if there is none."""
         if train.zone in self.disturbed:
             return train.zone
         for name in self.disturbed:
             zone = self._map.zones[name]
-            way_m = self._map.way_m(train.zone, train.chainage_m, name, zone.start_m)
-            if way_m is not None and abs(way_m) < 1.5 * zone.length_m:
+            distance_m = self._map.path_distance_m(train.zone, train.chainage_m, name, zone.start_m)
+            if distance_m is not None and abs(distance_m) < 1.5 * zone.length_m:
                 return name
         return None
 
 
-def _with_reason(fix: Fix, reason: str) -> Fix:
-    return Fix(
+def _with_reason(fix: TrainFix, reason: str) -> TrainFix:
+    return TrainFix(
         fix.train,
         fix.zone,
         fix.track,

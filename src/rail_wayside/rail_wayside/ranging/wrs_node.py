@@ -23,7 +23,7 @@ from rail_msgs_py.topics.tick import CLOCK
 from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence, silent_stamp_ns
 from rail_signals.ranging.signal import modulate
 
-from .ranging_station import NOTHING_HEARD, RangingStation
+from .ranging_station import NO_SIGNAL, RangingStation
 
 
 @dataclass(frozen=True)
@@ -109,11 +109,11 @@ class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
     def _on_block(self, zone: str, antenna: _Antenna, raw: bytes) -> None:
         stamp_ns = silent_stamp_ns(raw)
         if stamp_ns is not None:
-            reading = NOTHING_HEARD
+            reading = NO_SIGNAL
         else:
             block = Waveform.from_cdr(raw)
             stamp_ns = block.stamp_ns
-            reading = self._station.read(block.samples[0]) if self.switched_on else NOTHING_HEARD
+            reading = self._station.read(block.samples[0]) if self.switched_on else NO_SIGNAL
         antenna.publish(antenna.writer.write(stamp_ns, reading.range_m, reading.variance_m2))
         if reading.disturbance != antenna.disturbance:
             antenna.disturbance = reading.disturbance

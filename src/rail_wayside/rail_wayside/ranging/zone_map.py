@@ -19,7 +19,7 @@ NEIGHBOURHOOD = 3
 
 
 @dataclass(frozen=True)
-class Zone:
+class MappedZone:
     """One zone: from its station to the next one along ``track``.
 
     ``chainage_m`` and ``distance_m`` [point] both increase; they may go on past the zone's end.
@@ -65,11 +65,11 @@ class ZoneMap:
 
     Parameters
     ----------
-    zones : iterable of Zone
+    zones : iterable of MappedZone
     following : mapping of zone to the zones that begin at its end
     """
 
-    def __init__(self, zones: Iterable[Zone], following: Mapping[str, Iterable[str]]) -> None:
+    def __init__(self, zones: Iterable[MappedZone], following: Mapping[str, Iterable[str]]) -> None:
         self.zones = {zone.name: zone for zone in zones}
         self._ways: dict[str, dict[str, float]] = {}
         after = {name: tuple(following.get(name, ())) for name in self.zones}
@@ -85,7 +85,7 @@ class ZoneMap:
         self, name: str, after: Mapping[str, Iterable[str]], before: Mapping[str, Iterable[str]]
     ) -> dict[str, float]:
         """Distance from the start of a zone to the start of each zone of its neighbourhood."""
-        ways = {name: 0.0}
+        matchings = {name: 0.0}
         ahead, behind = {name: 0.0}, {name: 0.0}
         for _ in range(NEIGHBOURHOOD):
             ahead = {
@@ -98,11 +98,13 @@ class ZoneMap:
                 for here, offset in behind.items()
                 for other in before[here]
             }
-            ways = {**ahead, **behind, **ways}
-        return ways
+            matchings = {**ahead, **behind, **matchings}
+        return matchings
 
-    def way_m(self, zone: str, chainage_m: float, to: str, to_chainage_m: float) -> float | None:
-        """Signed way along the line from one place to another, None if not in reach of it."""
+    def path_distance_m(
+        self, zone: str, chainage_m: float, to: str, to_chainage_m: float
+    ) -> float | None:
+        """Signed distance along the line from one place to another, None if not in reach of it."""
         offset = self._ways[zone].get(to)
         if offset is None:
             return None

@@ -116,10 +116,10 @@ class CodeLogic:
             self._limits_mps.append(block.limit_mps)
             self._gradients.append(self.scales.gradient_index(block.gradient_permil))
             # As the train will count it: by the gradient it is told.
-            told = self.scales.gradient_step_permil * (
+            gradient_permil = self.scales.gradient_step_permil * (
                 self._gradients[-1] - self.scales.gradient_zero
             )
-            self._braking_mps2.append(deceleration_mps2(braking_mps2, told))
+            self._braking_mps2.append(deceleration_mps2(braking_mps2, gradient_permil))
 
     def fields(self, occupied: Sequence[bool | None]) -> dict[str, int]:
         """Fields of the first block's code.
@@ -142,7 +142,7 @@ class CodeLogic:
         count = len(self._lengths)
         if len(occupied) != count:
             raise ValueError(f"occupied: {len(occupied)} blocks, not {count}")
-        found: list[dict[str, int]] = []
+        fields: list[dict[str, int]] = []
         free = 0  # blocks ahead without a train or the line's end
         entry_mps = 0.0  # at which the block ahead may be entered
         for index in range(count - 1, -1, -1):
@@ -151,9 +151,9 @@ class CodeLogic:
                 limit_mps = self._limits_mps[index]
                 end_mps = 0.0 if free == self._overlap else min(limit_mps, entry_mps)
                 end = self.scales.speed_index(end_mps)
-                reach_mps = self._reach_mps(index, self._table_mps[end])
-                now = self.scales.speed_index(min(limit_mps, reach_mps))
-            found.append(
+                entry_limit_mps = self._entry_limit_mps(index, self._table_mps[end])
+                now = self.scales.speed_index(min(limit_mps, entry_limit_mps))
+            fields.append(
                 {
                     "speed": now << 4 | end,
                     "gradient": self._gradients[index],
@@ -164,9 +164,9 @@ class CodeLogic:
             entry_mps = self._table_mps[now]
             # Not known is occupied.
             free = free + 1 if occupied[index] is False else 0
-        return found[::-1]
+        return fields[::-1]
 
-    def _reach_mps(self, index: int, end_mps: float) -> float:
+    def _entry_limit_mps(self, index: int, end_mps: float) -> float:
         """Largest speed at the entrance from which ``end_mps`` is reached at the end."""
         b = self._braking_mps2[index]
         if b < LEAST_BRAKING_MPS2:
@@ -180,7 +180,7 @@ class CodeLogic:
 
 def _under_trains(blocks: Sequence[Block], longest_train_m: float) -> list[Block]:
     """Blocks with the lowest limit and the steepest fall under a train whose front is in them."""
-    found = []
+    fields = []
     for index, block in enumerate(blocks):
         limit_mps, gradient_permil = block.limit_mps, block.gradient_permil
         behind_m = 0.0
@@ -190,5 +190,5 @@ def _under_trains(blocks: Sequence[Block], longest_train_m: float) -> list[Block
             limit_mps = min(limit_mps, other.limit_mps)
             gradient_permil = min(gradient_permil, other.gradient_permil)
             behind_m += other.length_m
-        found.append(Block(block.length_m, limit_mps, gradient_permil))
-    return found
+        fields.append(Block(block.length_m, limit_mps, gradient_permil))
+    return fields

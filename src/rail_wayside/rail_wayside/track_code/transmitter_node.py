@@ -88,7 +88,9 @@ class TrackCodeTransmitterNode(
     def _check_parameters(self) -> None:
         p = self._p
         if p.profile not in profile_names():
-            raise ParameterError(f"profile: {p.profile}: is none of {', '.join(profile_names())}")
+            raise ParameterError(
+                f"profile: {p.profile}: is not one of {', '.join(profile_names())}"
+            )
         counts = {len(p.lengths_m), len(p.limits_mps), len(p.gradients_permil), 1 + len(p.ahead)}
         if len(counts) != 1:
             raise ParameterError(f"ahead: {p.ahead}: each needs a length, a limit and a gradient")

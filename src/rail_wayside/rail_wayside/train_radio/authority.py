@@ -7,7 +7,7 @@ from typing import NamedTuple
 from rail_msgs_py.train_radio.movement_authority import FURTHEST_M, LimitStep, MovementAuthority
 
 
-class Authority(NamedTuple):
+class IssuedAuthority(NamedTuple):
     """How far a train may go, and why no further.
 
     Chainage ``end_m`` [m] is not to be passed by the front; ``limit_mps`` holds up to the first
@@ -28,7 +28,7 @@ class Authority(NamedTuple):
 
 
 def to_telegram(
-    authority: Authority, located: tuple[float, float] | None = None
+    authority: IssuedAuthority, located: tuple[float, float] | None = None
 ) -> MovementAuthority:
     """Telegram of an authority.
 

@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
-from rail_msgs_py.train_radio.safe_frame import Kind
+from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.train_channel import CountedChannel
 from rail_msgs_py.train_radio.train_report import LocationReport
 
-from .moving_block import Authority, MovingBlock, to_telegram
+from .moving_block import IssuedAuthority, MovingBlock, to_telegram
 from .train_bounds import Trouble
 
 #: By so much another train's signal, 30 dB below, moves a range without being noticed [m].
@@ -26,17 +26,17 @@ _UNSEEN_M = 1.5
 
 
 @dataclass
-class _Caller:
+class _ConnectedTrain:
     """What the desk remembers of one train."""
 
     channel: CountedChannel
     leaves_at_m: float
     base: str | None = None
     place: tuple[float, float, float] | None = None  # time, ranged then, half-width
-    held: Authority | None = None
+    held: IssuedAuthority | None = None
 
 
-class Given(NamedTuple):
+class AuthorityState(NamedTuple):
     """What a train was given, as ``AUTHORITY.columns``; NaN = nothing."""
 
     end_of_authority_m: float
@@ -48,14 +48,14 @@ class Given(NamedTuple):
     rejected: int
 
 
-class Taken(NamedTuple):
+class AcceptedReport(NamedTuple):
     """A report taken from a train, true at `sealed_s`, the time-stamp of its frame."""
 
     sealed_s: float
     report: LocationReport
 
 
-class AuthorityDesk:
+class AuthorityIssuer:
     """Exchanges frames with the trains of a control area.
 
     Parameters
@@ -83,11 +83,11 @@ class AuthorityDesk:
         leaves = leaves_at_m or {}
         self._block, self._bases, self._sigmas = block, tuple(bases), fix_sigmas
         self._callers = {
-            number: _Caller(CountedChannel(channel), leaves.get(number, inf))
+            number: _ConnectedTrain(CountedChannel(channel), leaves.get(number, inf))
             for number, channel in channels.items()
         }
 
-    def receive(self, base: str, slot: int, frame: bytes, time_ns: int) -> Taken | None:
+    def receive(self, base: str, slot: int, frame: bytes, time_ns: int) -> AcceptedReport | None:
         """Take a frame that a base station received in the slot of a train; its report, if any."""
         caller = self._callers.get(slot)
         if caller is None:
@@ -106,7 +106,7 @@ class AuthorityDesk:
         self._block.report(slot, sealed_s, report)
         if report.position_valid and report.front_m >= caller.leaves_at_m:
             self._block.remove(slot)
-        return Taken(sealed_s, report)
+        return AcceptedReport(sealed_s, report)
 
     def ranged(
         self, number: int, time_s: float, segment: int, position_m: float, variance_m2: float
@@ -116,10 +116,10 @@ class AuthorityDesk:
         if not (isfinite(position_m) and isfinite(variance_m2)):
             return
         sigma_m = sqrt(variance_m2) + _UNSEEN_M / self._sigmas
-        taken = self._block.ranged(number, time_s, segment, position_m, sigma_m)
+        accepted = self._block.ranged(number, time_s, segment, position_m, sigma_m)
         # A range that contradicts what the train reports is nothing to tell it.
         doubtful = {Trouble.RANGE, Trouble.RANGE_SEGMENT, Trouble.LEAP}
-        if taken and not doubtful.intersection(self._block.troubles(number)):
+        if accepted and not doubtful.intersection(self._block.troubles(number)):
             caller.place = time_s, position_m, self._sigmas * sigma_m
 
     def telegrams(self, time_ns: int) -> dict[str, list[tuple[int, bytes]]]:
@@ -130,18 +130,20 @@ class AuthorityDesk:
             caller.held = authority
             if authority is None:
                 continue
-            told = to_telegram(authority, _now(caller.place, time_ns / NANOSECONDS))
-            frame = caller.channel.channel.seal(Kind.MOVEMENT_AUTHORITY, told.to_bytes(), time_ns)
+            telegram = to_telegram(authority, _now(caller.place, time_ns / NANOSECONDS))
+            frame = caller.channel.channel.seal(
+                FrameKind.MOVEMENT_AUTHORITY, telegram.to_bytes(), time_ns
+            )
             for base in self._bases if caller.base is None else (caller.base,):
                 out[base].append((number, frame))
         return out
 
-    def given(self, number: int, time_ns: int) -> Given:
+    def authority_state(self, number: int, time_ns: int) -> AuthorityState:
         """What a train was given last, and how its reports come in."""
         caller = self._callers[number]
         held = caller.held
         occupied = self._block.occupied(number, time_ns / NANOSECONDS)
-        return Given(
+        return AuthorityState(
             nan if held is None else held.end_m,
             nan if held is None else held.limit_mps,
             nan if occupied is None else occupied[0],

@@ -108,10 +108,10 @@ class CbtcBaseStationNode(
             # Where a scheme sends by two antennas and receives by one, that is the first.
             cut = self._slots.cut(block.samples[: self._slots.burst.scheme.receive])
             used = [slot for slot in range(1, len(cut)) if cut[slot, 0, 0] or cut[slot].any()]
-            found = self._receiver.receive(cut[used], doppler_hz=self._p.doppler_hz)
+            bursts = self._receiver.receive(cut[used], doppler_hz=self._p.doppler_hz)
             frames = [
                 (slot, frame_of(bits))
-                for slot, bits, detected in zip(used, found.bits, found.detected, strict=True)
+                for slot, bits, detected in zip(used, bursts.bits, bursts.detected, strict=True)
                 if detected
             ]
         self._report_frames(telegrams(block.stamp_ns, frames))

@@ -28,12 +28,12 @@ from math import inf
 from rail_msgs_py.train_radio.movement_authority import FASTEST_MPS, FURTHEST_M, LONGEST_S
 from rail_msgs_py.train_radio.train_report import LocationReport
 
-from .authority import Authority, to_telegram
+from .authority import IssuedAuthority, to_telegram
 from .speed_profile import Segment
 from .train_bounds import TrainBounds, TrainStart, Trouble
 from .train_order import TrainOrder, inverted
 
-__all__ = ["Authority", "MovingBlock", "Segment", "TrainStart", "Trouble", "to_telegram"]
+__all__ = ["IssuedAuthority", "MovingBlock", "Segment", "TrainStart", "Trouble", "to_telegram"]
 
 
 class MovingBlock:
@@ -99,11 +99,11 @@ class MovingBlock:
         self._margin_m, self._end_margin_m = margin_m, end_margin_m
         self._overspeed_mps, self._sigmas = overspeed_mps, sigmas
         self._validity_s, self._standing_mps = validity_s, standing_mps
-        self._lines: dict[int, TrainOrder] = {}
+        self._train_orders: dict[int, TrainOrder] = {}
         for segment in segments:
-            if segment.number in self._lines:
+            if segment.number in self._train_orders:
                 raise ValueError(f"segments: number {segment.number} is given twice")
-            self._lines[segment.number] = TrainOrder(segment)
+            self._train_orders[segment.number] = TrainOrder(segment)
         self._trains: dict[int, TrainBounds] = {}
         for train in trains:
             self.add(train)
@@ -123,9 +123,9 @@ class MovingBlock:
         """
         if start.number in self._trains:
             raise ValueError(f"number: train {start.number} is in service already")
-        if start.segment not in self._lines:
+        if start.segment not in self._train_orders:
             raise ValueError(f"segment: {start.segment} of train {start.number} is not known")
-        line = self._lines[start.segment]
+        line = self._train_orders[start.segment]
         bounds = TrainBounds(
             start,
             fastest_mps=line.segment.fastest_mps + self._overspeed_mps,
@@ -142,7 +142,7 @@ class MovingBlock:
         bounds = self._trains.pop(train, None)
         if bounds is None:
             return
-        self._lines[bounds.start.segment].remove(bounds)
+        self._train_orders[bounds.start.segment].remove(bounds)
         self._forget_strays(train, False)
         self._forget_strays(train, True)
 
@@ -160,13 +160,13 @@ class MovingBlock:
             return False
         if bounds.strayed and not bounds.invalid:
             self._forget_strays(train, False)
-            if (line := self._lines.get(report.segment)) is not None:
+            if (line := self._train_orders.get(report.segment)) is not None:
                 ends = (report.rear_m, report.front_m)
                 line.strays[train, False] = (bounds.start.name, min(ends), max(ends))
             return True
         if strayed and not bounds.strayed:
             self._forget_strays(train, False)
-        line = self._lines[bounds.start.segment]
+        line = self._train_orders[bounds.start.segment]
         if bounds.placed and not placed:
             line.insert(bounds)
         if bounds.rear_m > line.end_m(bounds.direction) and not (bounds.leap or bounds.clash):
@@ -178,7 +178,7 @@ class MovingBlock:
     ) -> bool:
         """Take the chainage of a train's front by phase ranging, with its standard deviation.
 
-        An infinite deviation, or a chainage that is none, says nothing. Returns whether it was
+        An infinite deviation, or what is not a chainage, says nothing. Returns whether it was
         taken.
 
         Raises
@@ -192,7 +192,7 @@ class MovingBlock:
         if bounds is None or sigma_m == inf or not -FURTHEST_M <= position_m <= FURTHEST_M:
             return False
         if segment != bounds.start.segment:
-            line = self._lines.get(segment)
+            line = self._train_orders.get(segment)
             if line is None or time_s <= bounds.ranged_s:
                 return False
             bounds.ranged_s = time_s
@@ -216,7 +216,7 @@ class MovingBlock:
             return None
         return bounds.direction * bounds.rear_m, bounds.direction * bounds.front_at_m(time_s)
 
-    def authority(self, train: int, time_s: float) -> Authority | None:
+    def authority(self, train: int, time_s: float) -> IssuedAuthority | None:
         """Issue the authority of a train at a time; it occupies what it is given.
 
         None if it is not in service, its place is not known, or it reports another track.
@@ -225,7 +225,7 @@ class MovingBlock:
         if bounds is None or not bounds.placed or bounds.strayed:
             return None
         number, direction = bounds.start.segment, bounds.direction
-        line = self._lines[number]
+        line = self._train_orders[number]
         end_m = line.end_m(direction) - self._end_margin_m
         cause = "end of the track"
         ahead = bounds.above if direction > 0 else bounds.below
@@ -248,7 +248,7 @@ class MovingBlock:
             return same
         shortened = bounds.issue(time_s, end_m, self._validity_s)
         limit_mps, steps = line.limits.ahead(direction, bounds.rear_m, bounds.front_m, end_m)
-        authority = Authority(
+        authority = IssuedAuthority(
             train,
             number,
             direction,
@@ -268,8 +268,8 @@ class MovingBlock:
         bounds = self._trains.get(train)
         if bounds is None:
             return ()
-        ranged_off = any((train, True) in line.strays for line in self._lines.values())
-        found = (
+        ranged_off = any((train, True) in line.strays for line in self._train_orders.values())
+        checks = (
             (bounds.invalid, Trouble.INVALID),
             (bounds.no_integrity, Trouble.INTEGRITY),
             (bounds.strayed, Trouble.SEGMENT),
@@ -280,9 +280,9 @@ class MovingBlock:
             (bounds.overrun, Trouble.OVERRUN),
             (inverted(bounds), Trouble.ORDER),
         )
-        return tuple(trouble for is_so, trouble in found if is_so)
+        return tuple(trouble for is_so, trouble in checks if is_so)
 
     def _forget_strays(self, train: int, ranged: bool) -> None:
-        for line in self._lines.values():
+        for line in self._train_orders.values():
             if line.strays:
                 line.strays.pop((train, ranged), None)

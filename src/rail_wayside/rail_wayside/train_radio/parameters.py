@@ -9,7 +9,7 @@ from rail_msgs_py.quantities import CLAIM_SIGMAS, PLACED, SEED, TICK
 from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.train_channel import controller_end
 
-from .authority_issuer import AuthorityDesk
+from .authority_issuer import AuthorityIssuer
 from .moving_block import MovingBlock
 from .speed_profile import Segment
 from .train_bounds import TrainStart
@@ -52,7 +52,7 @@ class AuthorityParameters:
     tick_s: float = TICK.parameter()
 
 
-def desk_of(p: AuthorityParameters) -> AuthorityDesk | None:
+def authority_issuer_of(p: AuthorityParameters) -> AuthorityIssuer | None:
     """Desk of the parameters, None without base stations.
 
     Raises
@@ -79,12 +79,12 @@ def desk_of(p: AuthorityParameters) -> AuthorityDesk | None:
             f"zone_controller: limits_mps: {len(p.limits_mps)} for {sum(p.limit_counts)} limits"
         )
     try:
-        return _desk(p)
+        return _authority_issuer(p)
     except ValueError as error:
         raise ParameterError(f"zone_controller: {error}") from None
 
 
-def _desk(p: AuthorityParameters) -> AuthorityDesk:
+def _authority_issuer(p: AuthorityParameters) -> AuthorityIssuer:
     limits = list(zip(p.limit_from_m, p.limits_mps, strict=True))
     segments = []
     for number, (name, length_m, count) in enumerate(
@@ -109,4 +109,4 @@ def _desk(p: AuthorityParameters) -> AuthorityDesk:
     )
     channels = {n: controller_end(p.secret, p.seed, n, p.tick_s) for n in p.train_numbers}
     leaves = {n: at for n, at in zip(p.train_numbers, p.leaves_at_m, strict=True) if at > 0.0}
-    return AuthorityDesk(block, channels, p.bases, leaves_at_m=leaves, fix_sigmas=p.fix_sigmas)
+    return AuthorityIssuer(block, channels, p.bases, leaves_at_m=leaves, fix_sigmas=p.fix_sigmas)

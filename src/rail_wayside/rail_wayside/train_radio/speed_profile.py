@@ -26,7 +26,7 @@ from rail_msgs_py.train_radio.movement_authority import (
 #: Longer tracks and intervals would bring steps past what a telegram can say.
 LONGEST_M = 0.4 * FURTHEST_M
 _MOST_PROFILES = 512
-_MOST_TOLD = 64
+_MOST_CACHED = 64
 _SAME_M = 1e-6
 
 
@@ -47,7 +47,7 @@ class Segment:
     Raises
     ------
     ValueError
-        If a value is out of its range or the limits are none or out of order.
+        If a value is out of its range or the limits are missing or out of order.
     """
 
     number: int
@@ -118,7 +118,7 @@ class _Profile:
                 # The last step that can be told must stand for all that cannot.
                 low = min(self.limits_mps[first + MOST_STEPS - 1 : stop])
                 steps = (*steps[:-1], LimitStep(steps[-1].from_m, low))
-            if len(self._told) >= _MOST_TOLD:
+            if len(self._told) >= _MOST_CACHED:
                 self._told.clear()
             self._told[first, stop] = steps
         return self.limits_mps[first - 1], steps

@@ -32,7 +32,7 @@ from rail_msgs_py.train_radio.train_report import (
     LocationReport,
 )
 
-from .authority import Authority
+from .authority import IssuedAuthority
 
 #: A range confirms a report that is at most this much older or younger.
 CONFIRM_S = 2.0
@@ -147,7 +147,7 @@ class TrainBounds:
         self.lead_m = 0.0
         self.invalid = self.no_integrity = self.strayed = self.leap = self.clash = False
         self.longer = self.overrun = False
-        self._heard_s = -inf
+        self._last_report_s = -inf
         #: Time of the newest range, on this track or another.
         self.ranged_s = -inf
         self._kept_m = 0.0  # worst rear of the proven reports
@@ -159,7 +159,7 @@ class TrainBounds:
         self.end_m = self.held_m = -inf
         self._issued_s = self._held_until_s = -inf
         #: The newest authority, and the rear and front it was made for.
-        self.granted: tuple[float, float, Authority] | None = None
+        self.granted: tuple[float, float, IssuedAuthority] | None = None
         if start.front_m is not None:
             at_m = start.direction * start.front_m
             self._place((start.since_s, at_m - start.uncertainty_m, at_m + start.uncertainty_m))
@@ -178,16 +178,16 @@ class TrainBounds:
         A report only says where the front may be; beyond where it was at first it comes only by
         an authority, unless a report proves that it went without.
         """
-        reach_m = max(self.end_m, self.held_m, self._start_m) + self.lead_m
-        return max(reach_m, self.front_m) if self.leap or self.clash else reach_m
+        furthest_m = max(self.end_m, self.held_m, self._start_m) + self.lead_m
+        return max(furthest_m, self.front_m) if self.leap or self.clash else furthest_m
 
     def front_at_m(self, time_s: float) -> float:
         """Furthest place of the front at a time.
 
         At the highest speed since the newest knowledge, but not past its authority.
         """
-        reach_m = self.front_m + self._fastest_mps * max(time_s - self._known_s, 0.0)
-        return min(reach_m, self.reserve_m)
+        furthest_m = self.front_m + self._fastest_mps * max(time_s - self._known_s, 0.0)
+        return min(furthest_m, self.reserve_m)
 
     def issue(self, time_s: float, end_m: float, validity_s: float) -> bool:
         """Take note of an authority given; whether it is shorter than the last one.
@@ -205,7 +205,9 @@ class TrainBounds:
         self.end_m, self._issued_s = end_m, time_s
         return shorter
 
-    def reissue(self, time_s: float, end_m: float, stop: bool, cause: str) -> Authority | None:
+    def reissue(
+        self, time_s: float, end_m: float, stop: bool, cause: str
+    ) -> IssuedAuthority | None:
         """Give the newest authority again, if nothing changed."""
         if self.granted is None or end_m != self.end_m:
             return None
@@ -219,9 +221,9 @@ class TrainBounds:
 
     def report(self, time_s: float, report: LocationReport) -> bool:
         """Take a report of this train on its own track and in its direction, if it is newer."""
-        if time_s <= self._heard_s:
+        if time_s <= self._last_report_s:
             return False
-        self._heard_s = time_s
+        self._last_report_s = time_s
         self.invalid = not report.position_valid
         if self.invalid:
             return True
@@ -255,10 +257,10 @@ class TrainBounds:
 
     def _note_front(self, where: tuple[float, float, float]) -> None:
         """Bound of the front of a train that moves by authority alone, with a new report."""
-        given_m = max(self.end_m, self.held_m)
-        reach_m = max(given_m, self._start_m) + self.lead_m + SAME_M
-        self.overrun = where[1] > reach_m and given_m > -inf
-        if self.overrun or given_m == -inf:
+        issued_m = max(self.end_m, self.held_m)
+        furthest_m = max(issued_m, self._start_m) + self.lead_m + SAME_M
+        self.overrun = where[1] > furthest_m and issued_m > -inf
+        if self.overrun or issued_m == -inf:
             self._start_m = where[2]
 
     def ranged(self, time_s: float, position_m: float, sigma_m: float) -> bool:
@@ -283,10 +285,10 @@ class TrainBounds:
             one, other = other, one
         at_s, low_m, high_m = other
         before_s, least_m, most_m = one
-        way_m = self._fastest_mps * (at_s - before_s) + SAME_M
-        if low_m > most_m + way_m:
+        run_m = self._fastest_mps * (at_s - before_s) + SAME_M
+        if low_m > most_m + run_m:
             return True
-        return high_m < least_m and high_m < least_m - min(self._roll_back_m + SAME_M, way_m)
+        return high_m < least_m and high_m < least_m - min(self._roll_back_m + SAME_M, run_m)
 
     def _compare(self) -> None:
         """Compare report and range."""

@@ -13,7 +13,7 @@ from rail_world.line.description_base import (
     Description,
     Length,
     Name,
-    Number,
+    StrictFloat,
     range_of,
 )
 from rail_world.ranging.description import Vector
@@ -36,9 +36,9 @@ class ReferenceFault(Description):
 
     kind: Literal["dead_reference", "detuned_reference"]
     station: Name
-    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
-    to_s: Annotated[Number, range_of(FAULT_END)]
-    shift_hz: Annotated[Number, range_of(quantities.DETUNING)] | None = None
+    from_s: Annotated[StrictFloat, range_of(FAULT_BEGIN)]
+    to_s: Annotated[StrictFloat, range_of(FAULT_END)]
+    shift_hz: Annotated[StrictFloat, range_of(quantities.DETUNING)] | None = None
 
     @model_validator(mode="after")
     def _is_of_its_kind(self) -> ReferenceFault:
@@ -60,15 +60,15 @@ class ReferenceDescription(Description):
     stations: tuple[ReferenceStation, ...] = Field(min_length=1, max_length=10_000)
     trains: tuple[str, ...] = ()
     tracks: tuple[str, ...] = Field(description="order that counts the tracks")
-    carrier_hz: Annotated[Number, range_of(quantities.CARRIER)]
-    sample_rate_hz: Annotated[Number, range_of(quantities.SAMPLE_RATE)]
+    carrier_hz: Annotated[StrictFloat, range_of(quantities.CARRIER)]
+    sample_rate_hz: Annotated[StrictFloat, range_of(quantities.SAMPLE_RATE)]
     samples: Annotated[int, range_of(quantities.SAMPLES)]
-    noise_figure_db: Annotated[Number, range_of(quantities.NOISE_FIGURE)]
-    path_loss_exponent: Annotated[Number, range_of(quantities.PATH_LOSS_EXPONENT)]
-    extra_loss_db: Annotated[Number, range_of(quantities.EXTRA_LOSS)]
-    reach_m: Length = Field(description="past which nothing is heard [m]")
-    receiver_ppm: Annotated[Number, range_of(quantities.RECEIVER_OFFSET)]
-    station_ppb: Annotated[Number, range_of(quantities.STATION_OFFSET)]
+    noise_figure_db: Annotated[StrictFloat, range_of(quantities.NOISE_FIGURE)]
+    path_loss_exponent: Annotated[StrictFloat, range_of(quantities.PATH_LOSS_EXPONENT)]
+    extra_loss_db: Annotated[StrictFloat, range_of(quantities.EXTRA_LOSS)]
+    coverage_range_m: Length = Field(description="beyond which nothing is received [m]")
+    receiver_ppm: Annotated[StrictFloat, range_of(quantities.RECEIVER_OFFSET)]
+    station_ppb: Annotated[StrictFloat, range_of(quantities.STATION_OFFSET)]
     faults: tuple[ReferenceFault, ...] = ()
 
     @model_validator(mode="after")

@@ -44,7 +44,7 @@ _LEAST_M = 1.0
 
 
 @dataclass(frozen=True)
-class _Sent:
+class _TransmittedTone:
     """A block that a station sends, and the mean frequency of its envelope [Hz]."""
 
     samples: ComplexArray
@@ -83,7 +83,7 @@ class ReferenceMedium:
         self.receiver_hz: FloatArray = rng.uniform(-most_hz, most_hz, len(description.trains))
         wavelength_m = SPEED_OF_LIGHT_M_PER_S / description.carrier_hz
         self._at_1m_db = 20.0 * np.log10(4.0 * np.pi / wavelength_m) + description.extra_loss_db
-        self._known: dict[int, _Sent] = {}
+        self._known: dict[int, _TransmittedTone] = {}
 
     def receive(
         self, tick: int, time_s: float, state: FloatArray, sent: Mapping[int, ComplexArray]
@@ -120,11 +120,11 @@ class ReferenceMedium:
                 else:
                     shift_hz[names[fault.station]] += fault.shift_hz
         on_line = np.flatnonzero(state[:, STATE.index["on_line"]] > 0.0).tolist()
-        heard: dict[int, NDArray[np.complex64]] = {}
+        received: dict[int, NDArray[np.complex64]] = {}
         for train in on_line:
             here = state[train, 1:4]
             away_m = np.sqrt(((self._stations_m - here) ** 2).sum(axis=1))
-            near = np.flatnonzero(away_m <= self.description.reach_m).tolist()
+            near = np.flatnonzero(away_m <= self.description.coverage_range_m).tolist()
             near = [station for station in near if station in sent and station not in dead]
             if not near:
                 continue
@@ -134,8 +134,8 @@ class ReferenceMedium:
             for row, station in enumerate(near):
                 offset_hz = shift_hz[station] - self.receiver_hz[train]
                 total += self._arrived(sent[station], station, distance_m[row], offset_hz)
-            heard[train] = total
-        return heard
+            received[train] = total
+        return received
 
     def snr(self, distance_m: FloatArray, power_mw: float) -> FloatArray:
         """Signal-to-noise ratio per sample of a station at a distance, linear."""
@@ -149,19 +149,19 @@ class ReferenceMedium:
     def _distances(self, row: FloatArray, stations: list[int]) -> FloatArray:
         """Distance from each station at each sample [station, sample]."""
         t = self._time_s
-        way_m = (
+        path_m = (
             row[STATE.index["speed_mps"]] * t + 0.5 * row[STATE.index["acceleration_mps2"]] * t * t
         )
         track = self._tracks[int(row[STATE.index["track_index"]])]
         chainage_m = min(max(row[STATE.index["chainage_m"]], 0.0), track.length_m)
-        bend_m = 0.5 * float(track.curvature_per_m(chainage_m)) * way_m * way_m
+        bend_m = 0.5 * float(track.curvature_per_m(chainage_m)) * path_m * path_m
         heading = row[STATE.index["heading_rad"]]
         cos, sin = np.cos(heading), np.sin(heading)
         place = row[1:4][:, None] + np.stack(
             (
-                cos * way_m - sin * bend_m,
-                sin * way_m + cos * bend_m,
-                1e-3 * float(track.gradient_permil(chainage_m)) * way_m,
+                cos * path_m - sin * bend_m,
+                sin * path_m + cos * bend_m,
+                1e-3 * float(track.gradient_permil(chainage_m)) * path_m,
             )
         )
         line = place[None] - self._stations_m[stations][:, :, None]
@@ -180,7 +180,7 @@ class ReferenceMedium:
         amplitude = 10.0 ** (self._gain_db(distance_m) / 20.0)
         return np.asarray(delayed * amplitude * cis(2.0 * np.pi * np.mod(turns, 1.0)))
 
-    def _sent(self, station: int, samples: ComplexArray) -> _Sent:
+    def _sent(self, station: int, samples: ComplexArray) -> _TransmittedTone:
         known = self._known.get(station)
         if known is None or known.samples is not samples:
             if samples.shape != (self.description.samples,):
@@ -190,5 +190,5 @@ class ReferenceMedium:
             power = np.abs(np.fft.fft(samples)) ** 2
             total = float(power.sum())
             mean_hz = float(power @ self._frequencies_hz) / total if total else 0.0
-            known = self._known[station] = _Sent(samples, mean_hz)
+            known = self._known[station] = _TransmittedTone(samples, mean_hz)
         return known

@@ -13,7 +13,15 @@ from typing import Annotated, Final
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from .description_base import LONGEST_TRACK_M, Chainage, Description, Length, Name, Number, Speed
+from .description_base import (
+    LONGEST_TRACK_M,
+    Chainage,
+    Description,
+    Length,
+    Name,
+    Speed,
+    StrictFloat,
+)
 
 TIGHTEST_RADIUS_M: Final = 20.0
 _MOST_TURN_RAD = 4.0 * math.pi
@@ -26,7 +34,7 @@ def _check_radius(value: object) -> object:
     return value
 
 
-Radius = Annotated[Number, BeforeValidator(_check_radius), Field(ge=-1e7, le=1e7)]
+Radius = Annotated[StrictFloat, BeforeValidator(_check_radius), Field(ge=-1e7, le=1e7)]
 
 
 class Straight(Description):
@@ -95,14 +103,14 @@ TrackElement = Annotated[
 class StartPose(Description):
     """Where chainage 0 lies in the map frame."""
 
-    x_m: Number = Field(default=0.0, ge=-1e7, le=1e7, description="east [m]")
-    y_m: Number = Field(default=0.0, ge=-1e7, le=1e7, description="north [m]")
-    heading_deg: Number = Field(
+    x_m: StrictFloat = Field(default=0.0, ge=-1e7, le=1e7, description="east [m]")
+    y_m: StrictFloat = Field(default=0.0, ge=-1e7, le=1e7, description="north [m]")
+    heading_deg: StrictFloat = Field(
         default=0.0, ge=-360.0, le=360.0, description="counter-clockwise from east [deg]"
     )
 
 
-Gradient = tuple[Chainage, Annotated[Number, Field(ge=-150.0, le=150.0)]]
+Gradient = tuple[Chainage, Annotated[StrictFloat, Field(ge=-150.0, le=150.0)]]
 SpeedLimit = tuple[Chainage, Speed]
 
 
@@ -144,7 +152,7 @@ class TrackDescription(Description):
     stops_m: tuple[Chainage, ...] = Field(
         default=(), max_length=10_000, description="chainages of the stopping points [m]"
     )
-    altitude_m: Number = Field(
+    altitude_m: StrictFloat = Field(
         default=0.0, ge=-1000.0, le=9000.0, description="altitude at chainage 0 [m]"
     )
     ttobench: str | None = Field(

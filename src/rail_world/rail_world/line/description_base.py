@@ -20,11 +20,11 @@ def _not_a_bool(value: object) -> object:
     return value
 
 
-Number = Annotated[float, BeforeValidator(_not_a_bool)]
+StrictFloat = Annotated[float, BeforeValidator(_not_a_bool)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
-Chainage = Annotated[Number, Field(ge=0.0, le=LONGEST_TRACK_M)]
-Length = Annotated[Number, Field(gt=0.0, le=LONGEST_TRACK_M)]
-Speed = Annotated[Number, Field(ge=1.0, le=600.0)]
+Chainage = Annotated[StrictFloat, Field(ge=0.0, le=LONGEST_TRACK_M)]
+Length = Annotated[StrictFloat, Field(gt=0.0, le=LONGEST_TRACK_M)]
+Speed = Annotated[StrictFloat, Field(ge=1.0, le=600.0)]
 
 
 Value = TypeVar("Value")

@@ -92,11 +92,11 @@ class Network:
             if after is not None:
                 junction = self._onto.get(after)
                 if junction is None or junction.track != name:
-                    way = "increasing" if direction > 0 else "decreasing"
+                    sense = "increasing" if direction > 0 else "decreasing"
                     raise WorldDataError(
                         "route",
                         list(tracks),
-                        f"no junction on {name} starts {after}, travelling towards {way} chainage",
+                        f"no junction on {name} starts {after}, towards {sense} chainage",
                     )
                 end_m = min(junction.at_m, end_m)
             start_m = legs[-1].path_end_m if legs else 0.0

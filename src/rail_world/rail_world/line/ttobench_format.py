@@ -35,18 +35,18 @@ def _radius(value: object) -> object:
     return value
 
 
-Number = Annotated[float, BeforeValidator(_a_number), Field(allow_inf_nan=False)]
+FiniteFloat = Annotated[float, BeforeValidator(_a_number), Field(allow_inf_nan=False)]
 Radius = Annotated[float, BeforeValidator(_radius)]
 LengthUnit = Literal["m", "km"]
 
 
-class Section(BaseModel):
+class TTOBenchSection(BaseModel):
     """A part of a file."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", populate_by_name=True)
 
 
-class Metadata(Section):
+class Metadata(TTOBenchSection):
     """Where the file comes from."""
 
     id: Annotated[str, Field(max_length=200)] | None = None
@@ -55,11 +55,11 @@ class Metadata(Section):
     )
 
 
-class Altitude(Section):
+class Altitude(TTOBenchSection):
     """Altitude at the first stop."""
 
     unit: LengthUnit
-    value: Number
+    value: FiniteFloat
 
     @model_validator(mode="after")
     def _check(self) -> Altitude:
@@ -69,11 +69,11 @@ class Altitude(Section):
         return self
 
 
-class Stops(Section):
+class Stops(TTOBenchSection):
     """Positions of the stops; the last is the length of the track."""
 
     unit: LengthUnit
-    values: tuple[Number, ...] = Field(min_length=2, max_length=10_000)
+    values: tuple[FiniteFloat, ...] = Field(min_length=2, max_length=10_000)
 
     @model_validator(mode="after")
     def _check(self) -> Stops:
@@ -88,18 +88,18 @@ class Stops(Section):
         return tuple(value * LENGTH_M[self.unit] for value in self.values)
 
 
-class SpeedUnits(Section):
+class SpeedUnits(TTOBenchSection):
     """Units of the speed limits."""
 
     position: LengthUnit
     velocity: Literal["km/h", "m/s"]
 
 
-class SpeedLimits(Section):
+class SpeedLimits(TTOBenchSection):
     """Pairs of position and limit, each holding up to the next."""
 
     units: SpeedUnits
-    values: tuple[tuple[Number, Number], ...] = Field(min_length=1, max_length=100_000)
+    values: tuple[tuple[FiniteFloat, FiniteFloat], ...] = Field(min_length=1, max_length=100_000)
 
     @model_validator(mode="after")
     def _check(self) -> SpeedLimits:
@@ -115,18 +115,18 @@ class SpeedLimits(Section):
         return self
 
 
-class SlopeUnits(Section):
+class SlopeUnits(TTOBenchSection):
     """Units of the gradients."""
 
     position: LengthUnit
     slope: Literal["permil", "\u2030", "%", "percent"]
 
 
-class Gradients(Section):
+class Gradients(TTOBenchSection):
     """Pairs of position and slope, uphill positive."""
 
     units: SlopeUnits
-    values: tuple[tuple[Number, Number], ...] = Field(max_length=100_000)
+    values: tuple[tuple[FiniteFloat, FiniteFloat], ...] = Field(max_length=100_000)
 
     @model_validator(mode="after")
     def _check(self) -> Gradients:
@@ -139,7 +139,7 @@ class Gradients(Section):
         return self
 
 
-class CurvatureUnits(Section):
+class CurvatureUnits(TTOBenchSection):
     """Units of the curvatures."""
 
     position: LengthUnit
@@ -147,11 +147,11 @@ class CurvatureUnits(Section):
     end: LengthUnit = Field(alias="radius at end")
 
 
-class Curvatures(Section):
+class Curvatures(TTOBenchSection):
     """Triples of position, radius at the start and radius at the end, right positive."""
 
     units: CurvatureUnits
-    values: tuple[tuple[Number, Radius, Radius], ...] = Field(max_length=100_000)
+    values: tuple[tuple[FiniteFloat, Radius, Radius], ...] = Field(max_length=100_000)
 
     @model_validator(mode="after")
     def _check(self) -> Curvatures:
@@ -166,7 +166,7 @@ class Curvatures(Section):
         return self
 
 
-class TTOBenchFile(Section):
+class TTOBenchFile(TTOBenchSection):
     """A whole file."""
 
     metadata: Metadata = Metadata()

@@ -31,10 +31,10 @@ class StationAntenna(Description):
     boresight: Vector
     downlink_channel: Channel
     uplink_channel: Channel
-    reach_m: float = Field(gt=0.0, description="distance past which nothing is heard")
+    coverage_range_m: float = Field(gt=0.0, description="distance beyond which nothing is received")
 
 
-class Fault(Description):
+class RadioFault(Description):
     """Something that goes wrong in the radio, from and to a simulated time."""
 
     kind: Literal["dead_station", "jam"]
@@ -46,7 +46,7 @@ class Fault(Description):
     position_m: Vector | None = None
 
     @model_validator(mode="after")
-    def _is_of_its_kind(self) -> Fault:
+    def _is_of_its_kind(self) -> RadioFault:
         wanted = {"station": self.kind == "dead_station"}
         wanted["channel"] = wanted["power_dbm"] = wanted["position_m"] = self.kind == "jam"
         for field, want in wanted.items():
@@ -71,4 +71,4 @@ class RadioDescription(Description):
     sensitivity_db: float = Field(
         -20.0, ge=-60.0, le=60.0, description="links weaker than this over noise are not computed"
     )
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[RadioFault, ...] = ()

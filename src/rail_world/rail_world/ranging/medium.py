@@ -4,7 +4,7 @@ Free-space loss at 1 m, then the path-loss exponent; parabolic antenna patterns;
 fractional delay of the envelope and the carrier phase of the same path; Doppler shift and
 oscillator offsets; the sum of all transmitters in reach on the channel; thermal noise.
 
-No station reaches past two zones (Jeong et al., section 2.5): beyond ``reach_m`` of a
+No station reaches past two zones (Jeong et al., section 2.5): beyond ``coverage_range_m`` of a
 station antenna a link does not exist, in either direction.
 """
 
@@ -48,13 +48,13 @@ class Paths:
     distance_m: FloatArray
     closing_speed_mps: FloatArray
     gain_db: FloatArray
-    in_reach: NDArray[np.bool_]
+    in_coverage: NDArray[np.bool_]
     train_position_m: FloatArray
     train_axis: FloatArray
 
 
 @dataclass(frozen=True)
-class _Sent:
+class _TransmittedBlock:
     """A block that an antenna sends, its mean power and the transform of its period."""
 
     samples: ComplexArray
@@ -104,7 +104,7 @@ class RadioMedium:
         self._positions_m = np.array([a.position_m for a in stations]).reshape(-1, 3)
         boresight = np.array([a.boresight for a in stations]).reshape(-1, 3)
         self._boresight = boresight / np.linalg.norm(boresight, axis=1, keepdims=True)
-        self._reach_m = np.array([a.reach_m for a in stations])
+        self._coverage_range_m = np.array([a.coverage_range_m for a in stations])
         self._downlink = np.array([a.downlink_channel for a in stations], dtype=np.int64)
         self._uplink = np.array([a.uplink_channel for a in stations], dtype=np.int64)
         self._sites = [a.site for a in stations]
@@ -127,7 +127,7 @@ class RadioMedium:
         ) * (description.sample_rate_hz)
         self._floor_mw = self.noise_mw * 10.0 ** (description.sensitivity_db / 10.0)
         self._noise = NoiseSource(seed, description.samples)
-        self._known: dict[tuple[bool, int], _Sent] = {}
+        self._known: dict[tuple[bool, int], _TransmittedBlock] = {}
 
     def paths(self, trains: TrainAntennas) -> Paths:
         """Distances, closing speeds and antenna gains of one tick."""
@@ -146,8 +146,8 @@ class RadioMedium:
             - 10.0 * radio.path_loss_exponent * np.log10(distance_m)
         )
         closing = -np.einsum("stk,tk->st", unit, trains.velocity_mps)
-        in_reach = distance_m <= self._reach_m[:, None]
-        return Paths(distance_m, closing, gain_db, in_reach, trains.position_m, axis)
+        in_coverage = distance_m <= self._coverage_range_m[:, None]
+        return Paths(distance_m, closing, gain_db, in_coverage, trains.position_m, axis)
 
     def dead_stations(self, time_s: float) -> set[int]:
         """Indices of station antennas that are dead at ``time_s``."""
@@ -178,7 +178,7 @@ class RadioMedium:
         """
         sending = self._alive(time_s)
         sending[[station for station in range(len(sending)) if station not in blocks]] = False
-        links = np.nonzero(paths.in_reach & sending[:, None])
+        links = np.nonzero(paths.in_coverage & sending[:, None])
         return self._receive(tick, time_s, paths, links, blocks, self._downlink[links[0]])
 
     def uplink(
@@ -193,11 +193,11 @@ class RadioMedium:
         ``blocks``: train index -> (channel, samples sent).
         Returns a dict of (station antenna index, channel) -> Reception.
         """
-        channel = np.zeros(paths.in_reach.shape[1], dtype=np.int64)
+        channel = np.zeros(paths.in_coverage.shape[1], dtype=np.int64)
         for train, (on, _) in blocks.items():
             channel[train] = on
         hears = (self._uplink[:, None] == channel) & self._alive(time_s)[:, None]
-        links = np.nonzero(paths.in_reach & hears)
+        links = np.nonzero(paths.in_coverage & hears)
         sent = {train: samples for train, (_, samples) in blocks.items()}
         return self._receive(tick, time_s, paths, links, sent, self._uplink[links[0]], uplink=True)
 
@@ -245,13 +245,13 @@ class RadioMedium:
             gain=10.0 ** (gain_db[audible] / 20.0) * cis(carrier_phase),
             sample_rate_hz=radio.sample_rate_hz,
         )
-        heard: dict[tuple[int, int], list[int]] = {}
+        arriving: dict[tuple[int, int], list[int]] = {}
         receivers = (s if uplink else t).tolist()
         for row, port in enumerate(zip(receivers, channel.tolist(), strict=True)):
-            heard.setdefault(port, []).append(row)
-        ports = [port[0] * 128 + port[1] for port in heard]
+            arriving.setdefault(port, []).append(row)
+        ports = [port[0] * 128 + port[1] for port in arriving]
         noise = self._noise.blocks(2 if uplink else 1, ports, tick)
-        for (port, rows), total in zip(heard.items(), noise, strict=True):
+        for (port, rows), total in zip(arriving.items(), noise, strict=True):
             noise_mw = self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
             total *= np.float32(np.sqrt(noise_mw))
             for row in rows:
@@ -265,7 +265,7 @@ class RadioMedium:
             )
         return received
 
-    def _sent(self, uplink: bool, sender: int, samples: ComplexArray) -> _Sent:
+    def _sent(self, uplink: bool, sender: int, samples: ComplexArray) -> _TransmittedBlock:
         """Power and spectrum of a block; a block that is sent again is not transformed again."""
         known = self._known.get((uplink, sender))
         if known is None or known.samples is not samples:
@@ -276,7 +276,7 @@ class RadioMedium:
             period = repetition(samples, len(known.spectrum) if known else 0)
             one = samples[:period]
             power_mw = float(np.vdot(one, one).real) / period
-            known = _Sent(samples, power_mw, np.fft.fft(one))
+            known = _TransmittedBlock(samples, power_mw, np.fft.fft(one))
             self._known[uplink, sender] = known
         return known
 

@@ -13,13 +13,13 @@ from rail_world.line.description_base import (
     Chainage,
     Description,
     Name,
-    Number,
+    StrictFloat,
     range_of,
     whole_samples,
 )
 
-Decibels = Annotated[Number, Field(ge=0.0, le=200.0)]
-Volts = Annotated[Number, Field(ge=0.0, le=1e4)]
+Decibels = Annotated[StrictFloat, Field(ge=0.0, le=200.0)]
+Volts = Annotated[StrictFloat, Field(ge=0.0, le=1e4)]
 
 
 class TrackCircuit(Description):
@@ -29,7 +29,7 @@ class TrackCircuit(Description):
     track: Name
     start_m: Chainage = Field(description="entry end [m]")
     end_m: Chainage = Field(description="exit end, that trains run towards [m]")
-    carrier_hz: Annotated[Number, range_of(quantities.CARRIER)]
+    carrier_hz: Annotated[StrictFloat, range_of(quantities.CARRIER)]
 
     @model_validator(mode="after")
     def _has_length(self) -> TrackCircuit:
@@ -54,12 +54,12 @@ class RailFault(Description):
     """
 
     kind: Literal["sanding", "broken_rail", "dead_transmitter"]
-    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
-    to_s: Annotated[Number, range_of(FAULT_END)]
+    from_s: Annotated[StrictFloat, range_of(FAULT_BEGIN)]
+    to_s: Annotated[StrictFloat, range_of(FAULT_END)]
     train: str | None = None
     circuit: str | None = None
     at_m: Chainage | None = None
-    loss_db: Annotated[Number, range_of(quantities.SANDING_LOSS)] | None = None
+    loss_db: Annotated[StrictFloat, range_of(quantities.SANDING_LOSS)] | None = None
 
     @model_validator(mode="after")
     def _names_its_place(self) -> RailFault:
@@ -86,17 +86,19 @@ class RailDescription(Description):
         default=(), description="order that counts the tracks; empty = as the circuits name them"
     )
     trains: tuple[str, ...] = ()
-    sample_rate_hz: Annotated[Number, range_of(quantities.SAMPLE_RATE)]
+    sample_rate_hz: Annotated[StrictFloat, range_of(quantities.SAMPLE_RATE)]
     transmit_level_v: Volts = Field(
         default=1.0, description="amplitude that a transmitted sample of 1 has at its feed [V]"
     )
-    attenuation_db_per_km: Annotated[Number, range_of(quantities.ATTENUATION)]
-    joint_attenuation_db: Annotated[Number, range_of(quantities.JOINT_LOSS)]
+    attenuation_db_per_km: Annotated[StrictFloat, range_of(quantities.ATTENUATION)]
+    joint_attenuation_db: Annotated[StrictFloat, range_of(quantities.JOINT_LOSS)]
     shunt_attenuation_db: Decibels = Field(default=50.0, description="past the axles of a train")
     white_noise_v: Volts = Field(description="rms of a sample [V]")
-    impulse_rate_per_s: Annotated[Number, range_of(quantities.IMPULSE_RATE)]
+    impulse_rate_per_s: Annotated[StrictFloat, range_of(quantities.IMPULSE_RATE)]
     impulse_amplitude_v: Volts = Field(description="mean height of an impulse [V]")
-    fundamental_hz: Number = Field(default=50.0, gt=0.0, le=1000.0, description="of the traction")
+    fundamental_hz: StrictFloat = Field(
+        default=50.0, gt=0.0, le=1000.0, description="of the traction"
+    )
     harmonics: tuple[Harmonic, ...] = ()
     faults: tuple[RailFault, ...] = ()
 

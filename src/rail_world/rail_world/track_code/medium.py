@@ -37,7 +37,7 @@ IntArray = NDArray[np.intp]
 
 # Circuits that a listener hears, counted along the track from its own. The second one ahead has
 # the listener's own carrier again; all others are another joint, and some 40 dB, weaker.
-_HEARD = np.array([-1, 0, 1, 2])
+_NEIGHBOURS = np.array([-1, 0, 1, 2])
 # Farther apart than any two chainages: makes one sorted axis of all tracks.
 _TRACK_APART_M = 4e6
 _ANTENNA_NOISE, _RECEIVER_NOISE, _ANTENNA_IMPULSES, _RECEIVER_IMPULSES = 1, 2, 3, 4
@@ -177,9 +177,9 @@ class RailMedium:
             if np.shape(block) != (samples,):
                 raise ValueError(f"circuit {circuit}: {np.shape(block)} samples, not {samples}")
         end, end_left = self.gains(trains, time_s), self._sanding(time_s)
-        begin, begin_left = end, end_left
+        start, start_left = end, end_left
         if self._last is not None and self._last[0] == tick - 1:
-            _, begin, begin_left = self._last
+            _, start, start_left = self._last
         self._last = (tick, end, end_left)
         arrived = np.zeros((count + circuits, samples))
         if blocks:
@@ -189,7 +189,7 @@ class RailMedium:
             row_of = np.full(circuits, -1, dtype=np.intp)
             row_of[sending] = np.arange(len(sending))
             # A product of a sparse matrix adds row by row: no listener depends on the others.
-            steady = _matrix(begin, row_of, len(sending))
+            steady = _matrix(start, row_of, len(sending))
             change = _matrix(end, row_of, len(sending)) - steady
             change.eliminate_zeros()
             arrived += steady @ sent
@@ -197,7 +197,7 @@ class RailMedium:
                 arrived += change @ (sent * self._ramp)
         if len(self._harmonic_v):
             harmonics = self._harmonics(tick)
-            left = begin_left[:, None] + (end_left - begin_left)[:, None] * self._ramp
+            left = start_left[:, None] + (end_left - start_left)[:, None] * self._ramp
             arrived[:count] += left * harmonics
             arrived[count:] += harmonics
         antennas, receivers = arrived[:count], arrived[count:]
@@ -214,14 +214,14 @@ class RailMedium:
         # Listeners: the antennas, then the receivers in the order of the description.
         own = np.concatenate((self._sorted_circuit(trains), self._place))
         x_m = np.concatenate((trains.front_m, self._start_m[self._place]))[:, None]
-        source = own[:, None] + _HEARD
+        source = own[:, None] + _NEIGHBOURS
         known = (own[:, None] >= 0) & (source >= 0) & (source < len(self._order))
         source = np.where(known, source, 0)
         known &= self._track[source] == self._track[own][:, None]
         from_m = self._end_m[source]
         low_m, high_m = np.minimum(x_m, from_m), np.maximum(x_m, from_m)
         loss_db = rails.attenuation_db_per_km * 1e-3 * (high_m - low_m)
-        loss_db += rails.joint_attenuation_db * np.abs(_HEARD)
+        loss_db += rails.joint_attenuation_db * np.abs(_NEIGHBOURS)
         between = self._trains_between(trains, self._track[own], low_m, high_m)
         loss_db += rails.shunt_attenuation_db * between
         circuit = self._order[source]
@@ -286,8 +286,8 @@ class RailMedium:
     def _harmonics(self, tick: int) -> FloatArray:
         """Harmonics of the traction current [sample], continuous over ticks [V]."""
         # The turns before the tick are taken out whole: few are left to lose digits on.
-        begin = np.mod(self._harmonic_step * (tick * self.samples) + self._harmonic_turns, 1.0)
-        turns = begin[:, None] + self._harmonic_step[:, None] * np.arange(self.samples)
+        start = np.mod(self._harmonic_step * (tick * self.samples) + self._harmonic_turns, 1.0)
+        turns = start[:, None] + self._harmonic_step[:, None] * np.arange(self.samples)
         total: FloatArray = np.einsum("h,hs->s", self._harmonic_v, np.cos(2.0 * np.pi * turns))
         return total
 

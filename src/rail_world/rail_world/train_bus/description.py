@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 
 from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
 from rail_msgs_py.train_bus import quantities
-from rail_world.line.description_base import Description, Name, Number, range_of
+from rail_world.line.description_base import Description, Name, StrictFloat, range_of
 
-Ohms = Annotated[Number, Field(gt=0.0, le=1e6)]
+Ohms = Annotated[StrictFloat, Field(gt=0.0, le=1e6)]
 
 FaultKind = Literal[
     "open",
@@ -31,18 +31,18 @@ class BusFaultDescription(Description):
     """
 
     fault: FaultKind
-    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
-    to_s: Annotated[Number, range_of(FAULT_END)]
+    from_s: Annotated[StrictFloat, range_of(FAULT_BEGIN)]
+    to_s: Annotated[StrictFloat, range_of(FAULT_END)]
     law: Literal["linear", "exponential"]
-    size: Annotated[Number, range_of(quantities.FAULT_SIZE)]
-    at_m: Annotated[Number, range_of(quantities.FAULT_PLACE)]
-    length_m: Annotated[Number, range_of(quantities.WET_LENGTH)]
-    conductance_us_per_m: Annotated[Number, range_of(quantities.WET_CONDUCTANCE)]
+    size: Annotated[StrictFloat, range_of(quantities.FAULT_SIZE)]
+    at_m: Annotated[StrictFloat, range_of(quantities.FAULT_PLACE)]
+    length_m: Annotated[StrictFloat, range_of(quantities.WET_LENGTH)]
+    conductance_us_per_m: Annotated[StrictFloat, range_of(quantities.WET_CONDUCTANCE)]
     car: Annotated[int, range_of(quantities.FAULT_CAR)]
     coupler: Annotated[int, range_of(quantities.FAULT_COUPLER)]
     profile: str = Field(description="whose cable is there instead; empty = nobody's")
-    noise_factor: Annotated[Number, range_of(quantities.NOISE_FACTOR)]
-    spread: Annotated[Number, range_of(quantities.CONTACT_SPREAD)]
+    noise_factor: Annotated[StrictFloat, range_of(quantities.NOISE_FACTOR)]
+    spread: Annotated[StrictFloat, range_of(quantities.CONTACT_SPREAD)]
 
 
 class TrainBus(Description):
@@ -57,14 +57,14 @@ class BusDescription(Description):
     """Everything the bus medium knows."""
 
     trains: tuple[TrainBus, ...] = Field(min_length=1)
-    bit_rate_hz: Annotated[Number, range_of(quantities.BIT_RATE)]
+    bit_rate_hz: Annotated[StrictFloat, range_of(quantities.BIT_RATE)]
     samples_per_bit: Annotated[int, range_of(quantities.SAMPLES_PER_BIT)]
-    level_v: Annotated[Number, range_of(quantities.LEVEL)]
-    noise_v: Annotated[Number, range_of(quantities.NOISE)]
+    level_v: Annotated[StrictFloat, range_of(quantities.LEVEL)]
+    noise_v: Annotated[StrictFloat, range_of(quantities.NOISE)]
     source_ohm: Ohms = Field(description="terminator at the head")
-    longest_delay_s: Number = Field(gt=0.0, le=1e-3)
+    longest_delay_s: StrictFloat = Field(gt=0.0, le=1e-3)
     reference_ohm: Ohms = Field(description="output of the reflectometer")
-    reflectometer_noise: Annotated[Number, range_of(quantities.REFLECTOMETER_NOISE)]
+    reflectometer_noise: Annotated[StrictFloat, range_of(quantities.REFLECTOMETER_NOISE)]
 
     @property
     def sample_rate_hz(self) -> float:

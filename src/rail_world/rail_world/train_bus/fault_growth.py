@@ -1,6 +1,6 @@
 """How a fault of a train's bus grows, as steps that are worth a new computation of the line.
 
-With u running from 0 at ``from_s`` to 1 at ``to_s``, a fault has the share g of its size:
+With u running from 0 at ``from_s`` to 1 at ``to_s``, a fault has the fraction g of its size:
 
     linear        g = u
     exponential   g = (K^u - 1) / (K - 1),  K = 1000
@@ -33,12 +33,12 @@ Law = Literal["linear", "exponential"]
 
 _K: Final = 1000.0
 _STEP: Final = 0.01
-_LEAST_SHARE: Final = 1e-4
+_LEAST_FRACTION: Final = 1e-4
 #: A contact that is not firm has another resistance every time; known to so many nepers.
 _CONTACT_STEP: Final = 0.05
 
 
-def share(law: Law, from_s: float, to_s: float, time_s: float) -> float:
+def growth_fraction(law: Law, from_s: float, to_s: float, time_s: float) -> float:
     """Share g of its size that a fault has at a time, 0 to 1.
 
     >>> share("linear", 10.0, 20.0, 15.0), share("exponential", 10.0, 20.0, 30.0)
@@ -49,11 +49,11 @@ def share(law: Law, from_s: float, to_s: float, time_s: float) -> float:
 
 
 def grown(fault: BusFaultDescription, time_s: float) -> float:
-    """Share of its size that a fault has at a time, in steps; 0 where there is none yet."""
+    """Fraction of its size that a fault has at a time, in steps; 0 where there is none yet."""
     if fault.fault in ("open", "wrong_cable"):
         return float(time_s >= fault.from_s)
-    g = share(fault.law, fault.from_s, fault.to_s, time_s)
-    if g < _LEAST_SHARE:
+    g = growth_fraction(fault.law, fault.from_s, fault.to_s, time_s)
+    if g < _LEAST_FRACTION:
         return 0.0
     return math.exp(round(math.log(g) / _STEP) * _STEP)
 
@@ -74,7 +74,7 @@ def contact(spread: float, normal: float) -> float:
 def fault_of(
     fault: BusFaultDescription, g: float, factor: float = 1.0, cable: Cable | None = None
 ) -> BusFault | None:
-    """What a fault that has grown to a share does to the line, None where there is none.
+    """What a fault that has grown to a fraction does to the line, None where there is none.
 
     Parameters
     ----------

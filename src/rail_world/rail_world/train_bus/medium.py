@@ -32,11 +32,11 @@ from scipy import fft
 from scipy.special import erfc
 
 from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.train_bus.bus_line import BusLine
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.cascade import reflection_at, transfer
 from rail_signals.train_bus.consist import Consist, Deviations
 from rail_signals.train_bus.faults import BusFault, MissingShieldGround
-from rail_signals.train_bus.line import Line
 from rail_signals.train_bus.profile import load_bus_profile
 from rail_signals.train_bus.roughness import draw_roughness, roughened
 from rail_signals.train_bus.tdr.response import TimeGrid
@@ -52,7 +52,7 @@ _MOST_KEPT: Final = 64
 _TO_TAIL, _TO_HEAD, _TRACES, _CONTACTS = 11, 12, 13, 14
 #: Normal numbers for the contacts in a tick: one for the frames, one for each trace.
 _MOST_TRACES: Final = 64
-#: Share of the sample rate that the reflectometer's sampler lets through, and its slope.
+#: Fraction of the sample rate that the reflectometer's sampler lets through, and its slope.
 _PASSED, _TAPER = 0.44, 0.02
 
 
@@ -97,24 +97,24 @@ class BusMedium:
         rng = np.random.Generator(bits)
         deviations = Deviations.draw(len(consist.runs), rng)
         self._rough = draw_roughness(consist, rng)
-        self._line = consist.line(deviations)
+        self._line = consist.bus_line(deviations)
         tolerances = consist.tolerances
         self._gain = 1.0 + tolerances.gain * deviations.gain
         self._offset = tolerances.offset * deviations.offset
         self._trigger_s = tolerances.trigger_s * deviations.trigger
         load_ohm = self._line.termination.resistance_ohm
-        self._way_back = bus.source_ohm / load_ohm if math.isfinite(load_ohm) else 1.0
+        self._return_factor = bus.source_ohm / load_ohm if math.isfinite(load_ohm) else 1.0
         self._kept: OrderedDict[Hashable, ComplexArray] = OrderedDict()
         self._noise: dict[int, RealNoiseSource] = {}
         self._contacts = RealNoiseSource(seed, 1 + _MOST_TRACES)
 
     @property
-    def line(self) -> Line:
+    def bus_line(self) -> BusLine:
         """The line as built, without its fault."""
         return self._line
 
     def grown(self, time_s: float) -> float:
-        """Share of its size that the fault has, 0 where there is none."""
+        """Fraction of its size that the fault has, 0 where there is none."""
         return 0.0 if self._fault is None else grown(self._fault, time_s)
 
     def fault(self, time_s: float, normal: float = 0.0) -> BusFault | None:
@@ -141,7 +141,7 @@ class BusMedium:
         count = len(sent) + bus.guard_samples
         length = int(fft.next_fast_len(count + bus.tail_samples, real=True))
         clean = fft.irfft(fft.rfft(sent, length) * self._transfer(fault, length), length)[:count]
-        clean *= bus.level_v * (1.0 if to_tail else self._way_back)
+        clean *= bus.level_v * (1.0 if to_tail else self._return_factor)
         sigma_v = bus.noise_v * _noise_factor(fault)
         stage = _TO_TAIL if to_tail else _TO_HEAD
         noise = self._source(count).blocks(stage, [self._index], tick)[0]
@@ -198,8 +198,8 @@ class BusMedium:
         step = grid.damping_per_s * grid.sample_period_s
         whole *= np.exp(-step * np.arange(length)) * grid.sample_period_s
         # Its sampler lets nothing through near half its rate: what rings there would fold back.
-        share = np.arange(length // 2 + 1) / length
-        passed = 0.5 * erfc((share - _PASSED) / _TAPER)
+        fraction = np.arange(length // 2 + 1) / length
+        passed = 0.5 * erfc((fraction - _PASSED) / _TAPER)
         return np.asarray(fft.rfft(whole) * passed * np.exp(s * self._trigger_s))
 
     def _normals(self, tick: int) -> FloatArray:
@@ -213,7 +213,7 @@ class BusMedium:
             self._noise[samples] = RealNoiseSource(self._seed, samples)
         return self._noise[samples]
 
-    def _faulty(self, fault: BusFault | None) -> Line:
+    def _faulty(self, fault: BusFault | None) -> BusLine:
         return self._line if fault is None else fault.apply(self._line)
 
     def _transfer(self, fault: BusFault | None, length: int) -> ComplexArray:
@@ -226,16 +226,16 @@ class BusMedium:
             frequency_hz[0] = 1e-3 * frequency_hz[1]
             if fault is not None and fault.kind == "open":
                 return self._keep(key, np.zeros(len(frequency_hz), dtype=np.complex128))
-            line = self._faulty(fault)
-            return self._keep(key, transfer(line, frequency_hz, bus.source_ohm)[-1])
+            bus_line = self._faulty(fault)
+            return self._keep(key, transfer(bus_line, frequency_hz, bus.source_ohm)[-1])
         self._kept.move_to_end(key)
         return self._kept[key]
 
     def _reflection(self, fault: BusFault | None, grid: TimeGrid, s: ComplexArray) -> ComplexArray:
         key = ("reflection", grid, fault)
         if key not in self._kept:
-            line = roughened(self._faulty(fault), self._rough)
-            return self._keep(key, reflection_at(line, s, self._bus.reference_ohm))
+            bus_line = roughened(self._faulty(fault), self._rough)
+            return self._keep(key, reflection_at(bus_line, s, self._bus.reference_ohm))
         self._kept.move_to_end(key)
         return self._kept[key]
 

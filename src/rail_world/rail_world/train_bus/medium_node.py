@@ -34,7 +34,7 @@ class BusMediumParameters(MediumParameters):
     """Parameters of the buses."""
 
 
-class _Train(NamedTuple):
+class _BusTrain(NamedTuple):
     """Medium and ports of one train."""
 
     medium: BusMedium
@@ -56,7 +56,7 @@ class BusMediumNode(MediumNode[BusMediumParameters], name="bus_medium", namespac
         self._tick_ns = self._world.tick_ns
         read = stamped(Waveform.from_cdr)
         self._trains = [
-            _Train(
+            _BusTrain(
                 medium,
                 self.inputs.port(BUS_TX, read, train=name, end="head"),
                 self.inputs.port(BUS_TX, read, train=name, end="tail"),
@@ -82,7 +82,7 @@ class BusMediumNode(MediumNode[BusMediumParameters], name="bus_medium", namespac
         self._links(stamp_ns, links)
 
     def _carry(
-        self, train: _Train, tick: int, stamp_ns: int, block: Waveform | None, to_tail: bool
+        self, train: _BusTrain, tick: int, stamp_ns: int, block: Waveform | None, to_tail: bool
     ) -> float:
         """Deliver a frame; the energy of its bits over the noise density [dB]."""
         publish = train.to_tail if to_tail else train.to_head
@@ -94,7 +94,7 @@ class BusMediumNode(MediumNode[BusMediumParameters], name="bus_medium", namespac
         publish(_block(stamp_ns, self._rate_hz, arrived.samples[None]))
         return 10.0 * log10(arrived.ebn0) if arrived.ebn0 > 0.0 else nan
 
-    def _reflect(self, train: _Train, tick: int, stamp_ns: int, block: Waveform | None) -> None:
+    def _reflect(self, train: _BusTrain, tick: int, stamp_ns: int, block: Waveform | None) -> None:
         if block is None or block.silent:
             rate_hz = self._rate_hz if block is None else block.sample_rate_hz
             train.to_reflectometer(silence(stamp_ns, rate_hz, 0.0, 0).to_cdr())

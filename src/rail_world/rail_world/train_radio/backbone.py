@@ -69,9 +69,9 @@ class Backbone:
         """How often each threat has struck."""
         return self._threats.strikes
 
-    def up(self, time_ns: int, heard: Frames) -> Carried:
+    def up(self, time_ns: int, received: Frames) -> Carried:
         """Frames that base stations heard in a tick -> frames that come to the controller."""
-        return self._carry(time_ns, heard, upward=True)
+        return self._carry(time_ns, received, upward=True)
 
     def down(self, time_ns: int, ordered: Frames) -> Carried:
         """Frames that the controller sends in a tick -> frames that come to base stations."""

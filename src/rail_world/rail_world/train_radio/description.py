@@ -10,21 +10,21 @@ from pydantic import Field, model_validator
 
 from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
 from rail_msgs_py.train_radio import quantities
-from rail_signals.train_radio.path_loss import Cutting, Section, Tunnel
+from rail_signals.train_radio.path_loss import Cutting, PathLossSection, Tunnel
 from rail_world.line.description_base import (
     Chainage,
     Description,
     Length,
     Name,
-    Number,
+    StrictFloat,
     range_of,
     whole_samples,
 )
 from rail_world.ranging.description import Channel, Vector
 
 Antennas = Annotated[int, Field(ge=1, le=2, strict=True)]
-Hertz = Annotated[Number, Field(gt=0.0, le=1e11)]
-PowerDbm = Annotated[Number, Field(ge=-150.0, le=80.0)]
+Hertz = Annotated[StrictFloat, Field(gt=0.0, le=1e11)]
+PowerDbm = Annotated[StrictFloat, Field(ge=-150.0, le=80.0)]
 
 
 class BaseStation(Description):
@@ -44,10 +44,12 @@ class LossSection(Description):
     track: Name
     from_m: Chainage
     to_m: Chainage
-    edge_m: Number = Field(default=0.0, ge=0.0, description="over which it begins and ends [m]")
-    wall_loss_db: Annotated[Number, range_of(quantities.ENTRY_LOSS)] | None = None
-    entry_loss_db: Annotated[Number, range_of(quantities.ENTRY_LOSS)] | None = None
-    loss_db_per_m: Annotated[Number, range_of(quantities.TUNNEL_LOSS_PER_M)] | None = None
+    edge_m: StrictFloat = Field(
+        default=0.0, ge=0.0, description="over which it begins and ends [m]"
+    )
+    wall_loss_db: Annotated[StrictFloat, range_of(quantities.ENTRY_LOSS)] | None = None
+    entry_loss_db: Annotated[StrictFloat, range_of(quantities.ENTRY_LOSS)] | None = None
+    loss_db_per_m: Annotated[StrictFloat, range_of(quantities.TUNNEL_LOSS_PER_M)] | None = None
 
     @model_validator(mode="after")
     def _is_of_its_kind(self) -> LossSection:
@@ -62,7 +64,7 @@ class LossSection(Description):
         self.section()
         return self
 
-    def section(self) -> Section:
+    def section(self) -> PathLossSection:
         """Its law of loss."""
         if self.kind == "cutting":
             return Cutting(self.from_m, self.to_m, self.wall_loss_db or 0.0, self.edge_m)
@@ -83,8 +85,8 @@ class CbtcFault(Description):
     """
 
     kind: Literal["dead_base_station", "jam"]
-    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
-    to_s: Annotated[Number, range_of(FAULT_END)]
+    from_s: Annotated[StrictFloat, range_of(FAULT_BEGIN)]
+    to_s: Annotated[StrictFloat, range_of(FAULT_END)]
     base_station: str | None = None
     channel: Channel | None = None
     noise_dbm: PowerDbm = Field(default=-90.0, description="over the whole sample rate [dBm]")
@@ -116,16 +118,16 @@ class CbtcDescription(Description):
     )
     downlink_hz: dict[Channel, Hertz] = Field(description="carriers to the trains [Hz]")
     uplink_hz: dict[Channel, Hertz] = Field(description="carriers from the trains [Hz]")
-    sample_rate_hz: Number = Field(gt=0.0, description="of the bursts, both ways [Hz]")
+    sample_rate_hz: StrictFloat = Field(gt=0.0, description="of the bursts, both ways [Hz]")
     base_antennas: Antennas
     train_antennas: Antennas
-    base_power_dbm: Annotated[Number, range_of(quantities.BASE_POWER)]
-    train_power_dbm: Annotated[Number, range_of(quantities.TRAIN_POWER)]
-    noise_figure_db: Annotated[Number, range_of(quantities.NOISE_FIGURE)]
-    path_loss_exponent: Annotated[Number, range_of(quantities.PATH_LOSS_EXPONENT)]
-    reach_m: Length = Field(description="past which nothing is heard [m]")
-    rician_factor: Annotated[Number, range_of(quantities.RICIAN_FACTOR)]
-    snr_offset_db: Annotated[Number, range_of(quantities.SNR_OFFSET)]
+    base_power_dbm: Annotated[StrictFloat, range_of(quantities.BASE_POWER)]
+    train_power_dbm: Annotated[StrictFloat, range_of(quantities.TRAIN_POWER)]
+    noise_figure_db: Annotated[StrictFloat, range_of(quantities.NOISE_FIGURE)]
+    path_loss_exponent: Annotated[StrictFloat, range_of(quantities.PATH_LOSS_EXPONENT)]
+    coverage_range_m: Length = Field(description="beyond which nothing is received [m]")
+    rician_factor: Annotated[StrictFloat, range_of(quantities.RICIAN_FACTOR)]
+    snr_offset_db: Annotated[StrictFloat, range_of(quantities.SNR_OFFSET)]
     sections: tuple[LossSection, ...] = ()
     faults: tuple[CbtcFault, ...] = ()
 

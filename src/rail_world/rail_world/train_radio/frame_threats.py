@@ -241,24 +241,24 @@ class FrameThreats:
 
     def _corrupted(self, frame: bytes) -> bytes:
         damaged = bytearray(frame)
-        way = self._below(3)
-        if way == 0:
+        choice = self._below(3)
+        if choice == 0:
             for bit in self._rng.choice(8 * len(frame), 1 + self._below(_FLIPPED_BITS), False):
                 damaged[bit >> 3] ^= 1 << (bit & 7)
         else:
-            start = self._below(len(frame)) if way == 1 else 0
-            length = 1 + self._below(len(frame) - start) if way == 1 else len(frame)
+            start = self._below(len(frame)) if choice == 1 else 0
+            length = 1 + self._below(len(frame) - start) if choice == 1 else len(frame)
             damaged[start : start + length] = self._rng.bytes(length)
         if damaged == frame:
             damaged[0] ^= 1
         return bytes(damaged)
 
     def _repeat(self, link: Link, frame: bytes, time_ns: int) -> None:
-        way = self._below(3)
-        if way == 0:
+        choice = self._below(3)
+        if choice == 0:
             self._add(link, frame, time_ns + AFTER_NS, Threat.REPETITION, time_ns)
             return
-        if way == 1:
+        if choice == 1:
             recent = self._recent[link]
             frame, sent_ns = recent[self._below(len(recent))]
         else:

@@ -53,15 +53,15 @@ class Run:
 
     def gain(self, time_s: FloatArray) -> FloatArray:
         """Amplitude gain without fading at a time from the begin of the tick [s]."""
-        begin, end = self.amplitude
-        return np.asarray(begin + (end - begin) * (time_s / self.tick_s))
+        start, end = self.amplitude
+        return np.asarray(start + (end - start) * (time_s / self.tick_s))
 
 
 @dataclass(frozen=True, eq=False)
 class Links:
     """All links of one tick, the truth.
 
-    ``distance_m`` and ``in_reach`` [base, train] at the end of the tick; ``gain_db``
+    ``distance_m`` and ``in_coverage`` [base, train] at the end of the tick; ``gain_db``
     [direction, moment, base, train], directions down and up, moments begin and end of the tick;
     ``sight`` [base, train] cosine between the way of the train and the line from the mast to it:
     -1 = it comes straight on; ``path_m``, ``speed_mps``, ``acceleration_mps2`` [train].
@@ -71,7 +71,7 @@ class Links:
     time_s: float
     tick_s: float
     distance_m: FloatArray
-    in_reach: NDArray[np.bool_]
+    in_coverage: NDArray[np.bool_]
     gain_db: FloatArray
     sight: FloatArray
     path_m: FloatArray
@@ -80,14 +80,14 @@ class Links:
 
     def run(self, base: int, train: int, direction: int) -> Run:
         """One of them."""
-        begin, end = (10.0 ** (self.gain_db[direction, :, base, train] / 20.0)).tolist()
+        start, end = (10.0 ** (self.gain_db[direction, :, base, train] / 20.0)).tolist()
         return Run(
             float(self.path_m[train]),
             float(self.speed_mps[train]),
             float(self.acceleration_mps2[train]),
             float(self.distance_m[base, train]),
             float(self.sight[base, train]),
-            (begin, end),
+            (start, end),
             self.tick_s,
         )
 
@@ -123,15 +123,15 @@ class LinkGeometry:
         along = np.stack((np.cos(table["heading_rad"]), np.sin(table["heading_rad"])), axis=1)
         sight = np.einsum("btk,tk->bt", line[..., :2], along) / distance_m
         v, a = table["speed_mps"], table["acceleration_mps2"]
-        begin_m = _moved(v, a, -self._tick_s)
+        start_m = _moved(v, a, -self._tick_s)
         gain_db = np.empty((2, 2, *distance_m.shape))
-        for moment, moved_m in enumerate((begin_m, np.zeros_like(v))):
-            way_m = _distance(distance_m, sight, moved_m)
+        for moment, moved_m in enumerate((start_m, np.zeros_like(v))):
+            moved_to_m = _distance(distance_m, sight, moved_m)
             loss_db = self._sections_db(table["track_index"], table["chainage_m"] + moved_m)
-            gain_db[:, moment] = self._radio.snr_offset_db - loss_db - self._path_db(way_m)
-        in_reach = (distance_m <= self._radio.reach_m) & (table["on_line"] > 0.0)
+            gain_db[:, moment] = self._radio.snr_offset_db - loss_db - self._path_db(moved_to_m)
+        in_coverage = (distance_m <= self._radio.coverage_range_m) & (table["on_line"] > 0.0)
         return Links(
-            *(tick, time_s, self._tick_s, distance_m, in_reach, gain_db, sight),
+            *(tick, time_s, self._tick_s, distance_m, in_coverage, gain_db, sight),
             *(table["path_m"], v, a),
         )
 

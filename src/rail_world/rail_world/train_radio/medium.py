@@ -9,7 +9,7 @@ over the base stations b in reach; a base station hears the trains alike. Sample
 
 ======= ===================================================================================
 g       sqrt of the power gain: path loss, cuttings and tunnels, offset; runs straight in t
-        from the begin to the end of a tick, where the next one begins
+        from the start to the end of a tick, where the next one begins
 h       fading of unit mean power along the way of the train, `rail_world.train_radio.fading`
 w       white Gaussian noise of k T F times the sample rate, single precision
 ======= ===================================================================================
@@ -149,7 +149,7 @@ class CbtcMedium:
             power_dbm = radio.train_power_dbm if uplink else radio.base_power_dbm
         gain_db = links.gain_db[UPLINK if uplink else DOWNLINK, 1]
         noise_mw = np.array([self._noise_mw(links, channel) for channel in self._channel])
-        hears = links.in_reach & self._alive(links)[:, None]
+        hears = links.in_coverage & self._alive(links)[:, None]
         ratio = 10.0 ** ((power_dbm + gain_db) / 10.0) / noise_mw[:, None]
         return np.where(hears, ratio, 0.0)
 
@@ -184,16 +184,16 @@ class CbtcMedium:
         for (train, channel), spans in windows.items():
             near = [
                 base
-                for base in np.flatnonzero(links.in_reach[:, train]).tolist()
+                for base in np.flatnonzero(links.in_coverage[:, train]).tolist()
                 if self._channel[base] == channel
             ]
             if near:
-                heard = [base for base in near if alive[base] and base in sent]
+                received = [base for base in near if alive[base] and base in sent]
                 ports[train, channel] = _Port(
                     train * _MOST_CHANNELS + channel,
                     self._noise_mw(links, channel),
                     spans,
-                    tuple((base, train, sent[base]) for base in heard),
+                    tuple((base, train, sent[base]) for base in received),
                 )
         return self._receive(links, DOWNLINK, ports)
 
@@ -211,15 +211,15 @@ class CbtcMedium:
         alive = self._alive(links)
         ports: dict[int, _Port] = {}
         for base, spans in windows.items():
-            near = np.flatnonzero(links.in_reach[base]).tolist()
+            near = np.flatnonzero(links.in_coverage[base]).tolist()
             if near and alive[base]:
                 channel = self._channel[base]
-                heard = [train for train in near if train in sent and sent[train][0] == channel]
+                received = [train for train in near if train in sent and sent[train][0] == channel]
                 ports[base] = _Port(
                     base * _MOST_CHANNELS + channel,
                     self._noise_mw(links, channel),
                     spans,
-                    tuple((base, train, sent[train][1]) for train in heard),
+                    tuple((base, train, sent[train][1]) for train in received),
                 )
         return self._receive(links, UPLINK, ports)
 

@@ -101,13 +101,13 @@ class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", names
             (train, channel): (self._span(0), self._span(1 + train))
             for train, channel in self._train_out
         }
-        heard = self._medium.downlink(links, sent, windows)
+        received = self._medium.downlink(links, sent, windows)
         for key, publish in self._train_out.items():
             channel = key[1]
-            if key not in heard:
+            if key not in received:
                 publish(self._silence_down[channel].at(stamp_ns))
                 continue
-            samples = np.concatenate([burst.samples for burst in heard[key]], axis=1)
+            samples = np.concatenate([burst.samples for burst in received[key]], axis=1)
             carrier_hz = self._radio.downlink_hz[channel]
             publish(self._block(stamp_ns, carrier_hz, channel, samples))
 
@@ -127,20 +127,20 @@ class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", names
             near = [
                 train
                 for train, (channel, _) in sent.items()
-                if channel == base.channel and links.in_reach[index, train]
+                if channel == base.channel and links.in_coverage[index, train]
             ]
             if near:
                 windows[index] = [self._span(1 + train) for train in near]
-        heard = self._medium.uplink(links, sent, windows)
+        received = self._medium.uplink(links, sent, windows)
         slots = 1 + len(self._radio.trains)
         for index, publish in enumerate(self._base_out):
             channel = self._radio.base_stations[index].channel
-            if index not in heard:
+            if index not in received:
                 publish(self._silence_up[channel].at(stamp_ns))
                 continue
-            antennas = heard[index][0].samples.shape[0]
+            antennas = received[index][0].samples.shape[0]
             samples = np.zeros((antennas, slots * self._p.burst_samples), dtype=np.complex128)
-            for burst in heard[index]:
+            for burst in received[index]:
                 samples[:, burst.start : burst.stop] = burst.samples
             publish(self._block(stamp_ns, self._radio.uplink_hz[channel], channel, samples))
 

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field
 
 from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
 from rail_msgs_py.train_radio import quantities
-from rail_world.line.description_base import Description, Number, range_of
+from rail_world.line.description_base import Description, StrictFloat, range_of
 
 from .frame_threats import Threat, ThreatRates
 
@@ -34,10 +34,10 @@ class ThreatPeriod(Description):
     """
 
     threats: Threats
-    rate: Annotated[Number, range_of(quantities.THREAT_RATE)]
-    from_s: Annotated[Number, range_of(FAULT_BEGIN)]
-    to_s: Annotated[Number, range_of(FAULT_END)]
-    longest_delay_s: Annotated[Number, range_of(quantities.LONGEST_DELAY)]
+    rate: Annotated[StrictFloat, range_of(quantities.THREAT_RATE)]
+    from_s: Annotated[StrictFloat, range_of(FAULT_BEGIN)]
+    to_s: Annotated[StrictFloat, range_of(FAULT_END)]
+    longest_delay_s: Annotated[StrictFloat, range_of(quantities.LONGEST_DELAY)]
 
     def acts(self, time_s: float) -> bool:
         """Whether it is there at a simulated time [s]."""

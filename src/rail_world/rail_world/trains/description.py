@@ -20,8 +20,8 @@ from rail_world.line.description_base import (
     Chainage,
     Description,
     Name,
-    Number,
     Speed,
+    StrictFloat,
     field_of,
     range_of,
 )
@@ -32,9 +32,9 @@ from .presets import PRESETS
 class Davis(Description):
     """Running resistance a + b v + c v^2 on straight, level track (Davis, 1926)."""
 
-    a_n: Number = Field(ge=0.0, le=1e6, description="constant term [N]")
-    b_n_per_mps: Number = Field(ge=0.0, le=1e5, description="linear term [N/(m/s)]")
-    c_n_per_mps2: Number = Field(ge=0.0, le=1e4, description="quadratic term [N/(m/s)^2]")
+    a_n: StrictFloat = Field(ge=0.0, le=1e6, description="constant term [N]")
+    b_n_per_mps: StrictFloat = Field(ge=0.0, le=1e5, description="linear term [N/(m/s)]")
+    c_n_per_mps2: StrictFloat = Field(ge=0.0, le=1e4, description="quadratic term [N/(m/s)^2]")
 
 
 class VehicleDescription(Description):
@@ -43,21 +43,21 @@ class VehicleDescription(Description):
     preset: Literal["metro", "regional", "high_speed"] = Field(
         default="metro", description="where the figures left out come from"
     )
-    mass_kg: Number = Field(ge=1e3, le=1e7, description="mass [kg]")
-    rotating_mass_factor: Number = Field(
+    mass_kg: StrictFloat = Field(ge=1e3, le=1e7, description="mass [kg]")
+    rotating_mass_factor: StrictFloat = Field(
         ge=1.0, le=1.5, description="inertia of wheels and motors: effective over true mass"
     )
     davis: Davis = Field(description="running resistance")
-    max_traction_n: Number = Field(gt=0.0, le=1e7, description="greatest tractive effort [N]")
-    max_power_w: Number = Field(gt=0.0, le=1e8, description="greatest power at the wheels [W]")
-    max_service_brake_mps2: Number = Field(
+    max_traction_n: StrictFloat = Field(gt=0.0, le=1e7, description="greatest tractive effort [N]")
+    max_power_w: StrictFloat = Field(gt=0.0, le=1e8, description="greatest power at the wheels [W]")
+    max_service_brake_mps2: StrictFloat = Field(
         ge=0.2, le=3.0, description="full service braking on level track [m/s^2]"
     )
-    emergency_brake_mps2: Number = Field(
+    emergency_brake_mps2: StrictFloat = Field(
         ge=0.2, le=5.0, description="emergency braking on level track [m/s^2]"
     )
     max_speed_kmh: Speed = Field(description="design speed [km/h]")
-    length_m: Annotated[Number, range_of(TRAIN_LENGTH)]
+    length_m: Annotated[StrictFloat, range_of(TRAIN_LENGTH)]
 
     @model_validator(mode="before")
     @classmethod
@@ -103,11 +103,11 @@ class ReversalDescription(Description):
     """The train stops at a point, or at a time, and runs back."""
 
     at_m: Chainage | None = Field(default=None, description="chainage to stop at [m]")
-    at_s: Annotated[Number, Field(ge=0.0, le=1e6)] | None = Field(
+    at_s: Annotated[StrictFloat, Field(ge=0.0, le=1e6)] | None = Field(
         default=None, description="time at which the train brakes to a stand [s]"
     )
     track: Name | None = Field(default=None, description="track of at_m; null = the first one")
-    dwell_s: Number = Field(
+    dwell_s: StrictFloat = Field(
         default=10.0, ge=0.0, le=1e5, description="stand before running back [s]"
     )
 
@@ -127,9 +127,9 @@ class TrainDescription(Description):
     route: tuple[Name, ...] = Field(
         min_length=1, max_length=100, description="tracks in order of travel, joined by junctions"
     )
-    start_m: Number = field_of(TRAIN_START)
-    depart_s: Number = Field(default=0.0, ge=0.0, le=1e6, description="time of departure [s]")
-    speed_kmh: Number = Field(
+    start_m: StrictFloat = field_of(TRAIN_START)
+    depart_s: StrictFloat = Field(default=0.0, ge=0.0, le=1e6, description="time of departure [s]")
+    speed_kmh: StrictFloat = Field(
         default=0.0, ge=0.0, le=600.0, description="speed at departure [km/h]"
     )
     direction: Direction = field_of(DIRECTION)
@@ -141,7 +141,9 @@ class TrainDescription(Description):
         description="whether the train is gone when its run ends; it then runs out of the end of a"
         " track without braking",
     )
-    dwell_s: Number = Field(default=30.0, ge=0.0, le=1e5, description="stand at every stop [s]")
+    dwell_s: StrictFloat = Field(
+        default=30.0, ge=0.0, le=1e5, description="stand at every stop [s]"
+    )
     target_speed_kmh: Speed | None = Field(
         default=None, description="the driver goes no faster than this [km/h]"
     )

@@ -23,7 +23,7 @@ from rail_world.line.route import Route
 from .vehicle import Extent, Vehicle
 
 # The driver plans with this part of full service braking, unless slopes ask for less.
-BRAKE_SHARE = 0.8
+BRAKE_FRACTION = 0.8
 _LEAST_BRAKING_MPS2 = 0.1
 
 
@@ -160,8 +160,8 @@ class Driver:
     limits_mps : StepProfile
         Speed limit for the reference point, with the whole train counted.
     deceleration_mps2 : float
-        The braking planned with: a share of full service braking, and never more than the service
-        brake gives on the steepest slope down [m/s^2].
+        The braking planned with: a fraction of full service braking, and never more than the
+        service brake gives on the steepest slope down [m/s^2].
     envelopes : dict of {1, -1} to BrakingEnvelope
         Permitted speeds for both running directions.
 
@@ -181,7 +181,9 @@ class Driver:
         target_speed_mps: float = inf,
     ) -> None:
         brake = vehicle.service_brake_mps2
-        self.deceleration_mps2 = min(BRAKE_SHARE * brake, brake - vehicle.gravity_mps2 * steepest)
+        self.deceleration_mps2 = min(
+            BRAKE_FRACTION * brake, brake - vehicle.gravity_mps2 * steepest
+        )
         if self.deceleration_mps2 < _LEAST_BRAKING_MPS2:
             raise ValueError(f"is too weak for a slope of {1e3 * steepest:g} per mille")
         self.limits_mps = limits_for_train(

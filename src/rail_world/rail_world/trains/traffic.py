@@ -111,5 +111,5 @@ class CentreLine:
         """x, y, z [m] and heading [rad] of each point, [point, 4]."""
         place = path_m * self._per_metre
         before = np.clip(place.astype(np.intp), 0, len(self._poses) - 2)
-        share = (place - before)[:, None]
-        return self._poses[before] * (1.0 - share) + self._poses[before + 1] * share
+        fraction = (place - before)[:, None]
+        return self._poses[before] * (1.0 - fraction) + self._poses[before + 1] * fraction

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rail_corridor.equipment.ranging.calibration import BENCH_SNR, calibrate
+from rail_corridor.equipment.ranging.calibration import RIG_SNR, calibrate
 from rail_corridor.equipment.ranging.section import TransponderPlan
 from rail_signals.ranging.bounds import tone_phase_variance_bound
 from rail_signals.ranging.phase_range import range_per_radian_m
@@ -13,7 +13,7 @@ from rail_signals.ranging.signal import RangingSignal
 
 SIGNAL = RangingSignal()
 UNITS = [
-    calibrate(TransponderPlan(bench_bursts=20), SIGNAL, np.random.default_rng(seed))
+    calibrate(TransponderPlan(calibration_bursts=20), SIGNAL, np.random.default_rng(seed))
     for seed in range(120)
 ]
 
@@ -33,7 +33,7 @@ def test_the_trim_brings_every_unit_to_the_delay_of_the_fleet() -> None:
 
 
 def test_the_residual_is_what_the_noise_of_the_bench_leaves() -> None:
-    bound_rad2 = tone_phase_variance_bound(BENCH_SNR, SIGNAL.samples * 20, SIGNAL.indices[0])
+    bound_rad2 = tone_phase_variance_bound(RIG_SNR, SIGNAL.samples * 20, SIGNAL.indices[0])
     sigma_m = np.sqrt(float(bound_rad2)) * range_per_radian_m(SIGNAL.tones_hz[0])
     residuals_m = np.array([unit.residual_m for unit in UNITS])
     assert [unit.sigma_m for unit in UNITS] == pytest.approx(np.full(120, sigma_m), rel=0.05)
@@ -46,6 +46,6 @@ def test_a_unit_without_spread_has_the_nominal_delay() -> None:
 
 
 def test_a_delay_is_never_negative() -> None:
-    plan = TransponderPlan(delay_s=0.0, spread_s=1e-6, bench_bursts=1)
+    plan = TransponderPlan(delay_s=0.0, spread_s=1e-6, calibration_bursts=1)
     units = [calibrate(plan, SIGNAL, np.random.default_rng(seed)) for seed in range(20)]
     assert min(unit.delay_s for unit in units) == 0.0

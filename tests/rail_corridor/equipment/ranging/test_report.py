@@ -65,9 +65,9 @@ def right_channel(way_m: float) -> int:
 def test_errors_put_in_come_out() -> None:
     path_m = along(20.0, 1100.0)
     errors_m = 0.2 * np.random.default_rng(1).standard_normal(len(path_m))
-    figures = train_metrics(SCENARIO, run(path_m, right_channel, errors_m), 0)
-    ranging = figures["phase_ranging"]
-    assert figures["distance_m"] == pytest.approx(path_m[-1] - path_m[0])
+    values = train_metrics(SCENARIO, run(path_m, right_channel, errors_m), 0)
+    ranging = values["phase_ranging"]
+    assert values["distance_m"] == pytest.approx(path_m[-1] - path_m[0])
     assert ranging["availability"] == 1.0
     assert ranging["rmse_m"] == pytest.approx(math.sqrt(np.mean(errors_m**2)))
     assert ranging["p95_m"] == pytest.approx(np.quantile(np.abs(errors_m), 0.95))
@@ -118,32 +118,32 @@ def test_a_run_of_which_nothing_is_known_has_no_figures() -> None:
 
 @pytest.mark.parametrize("ends_m", [(20.0, 1150.0), (1150.0, 20.0)])
 def test_every_station_passed_is_a_handover(ends_m: tuple[float, float]) -> None:
-    figures = train_metrics(SCENARIO, run(along(*ends_m), right_channel), 0)["handovers"]
-    assert (figures["expected"], figures["made"]) == (5, 5)
-    assert (figures["missed"], figures["wrong"]) == (0, 0)
-    assert figures["furthest_m"] <= SPEED_MPS * 0.1
+    values = train_metrics(SCENARIO, run(along(*ends_m), right_channel), 0)["handovers"]
+    assert (values["expected"], values["made"]) == (5, 5)
+    assert (values["missed"], values["wrong"]) == (0, 0)
+    assert values["furthest_m"] <= SPEED_MPS * 0.1
 
 
 def test_a_little_late_is_made_and_too_late_is_missed() -> None:
     path_m = along(20.0, 380.0)
     for late_m, missed in ((HANDOVER_DEPTH_M - 3.0, 0), (HANDOVER_DEPTH_M + 10.0, 1)):
-        figures = train_metrics(
+        values = train_metrics(
             SCENARIO, run(path_m, lambda way_m, late=late_m: right_channel(way_m - late)), 0
         )["handovers"]
-        assert (figures["expected"], figures["missed"]) == (1, missed)
-        assert figures["furthest_m"] == pytest.approx(late_m, abs=SPEED_MPS * 0.1)
+        assert (values["expected"], values["missed"]) == (1, missed)
+        assert values["furthest_m"] == pytest.approx(late_m, abs=SPEED_MPS * 0.1)
 
 
 def test_a_change_to_a_foreign_channel_is_wrong() -> None:
     path_m = along(20.0, 180.0)
-    figures = train_metrics(
+    values = train_metrics(
         SCENARIO, run(path_m, lambda way_m: 3 if 90.0 < way_m < 110.0 else 1), 0
     )["handovers"]
     # There and, back on its own channel, not.
-    assert (figures["expected"], figures["wrong"]) == (0, 1)
+    assert (values["expected"], values["wrong"]) == (0, 1)
 
 
 def test_a_train_that_turns_back_at_a_station_owes_no_handover() -> None:
     path_m = np.concatenate([along(150.0, 210.0), along(210.0, 150.0)])
-    figures = train_metrics(SCENARIO, run(path_m, right_channel), 0)["handovers"]
-    assert (figures["expected"], figures["missed"], figures["wrong"]) == (0, 0, 0)
+    values = train_metrics(SCENARIO, run(path_m, right_channel), 0)["handovers"]
+    assert (values["expected"], values["missed"], values["wrong"]) == (0, 0, 0)

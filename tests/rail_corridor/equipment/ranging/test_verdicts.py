@@ -24,8 +24,8 @@ def plain(chainage_m: Any, sigma_m: Any = SIGMA_M, **more: Any) -> dict[str, Any
     """Return the figures of a train that is ranged at certain places while it stands."""
     run = RunBuilder("plain_line", TICKS).moves("train_a", WAY_M)
     section = run.ranged("train_a", chainage_m, sigma_m, channel=3.0, **more).train("train_a")
-    figures: dict[str, Any] = section["phase_ranging"]
-    return figures
+    values: dict[str, Any] = section["phase_ranging"]
+    return values
 
 
 def at(ticks: tuple[int, ...], value: float, otherwise: float = 0.0) -> Any:
@@ -39,27 +39,27 @@ def at(ticks: tuple[int, ...], value: float, otherwise: float = 0.0) -> Any:
 def test_a_position_misleads_from_six_sigma_and_a_metre_on(
     side: float, beyond_m: float, misleading: int
 ) -> None:
-    figures = plain(WAY_M + side * at((1, 2, 6), LIMIT_M + beyond_m))
-    assert figures["misleading_ticks"] == misleading
-    assert figures["wrong_track_ticks"] == 0
-    assert figures["max_m"] == pytest.approx(LIMIT_M, abs=1e-5)
+    values = plain(WAY_M + side * at((1, 2, 6), LIMIT_M + beyond_m))
+    assert values["misleading_ticks"] == misleading
+    assert values["wrong_track_ticks"] == 0
+    assert values["max_m"] == pytest.approx(LIMIT_M, abs=1e-5)
 
 
 def test_what_is_not_claimed_does_not_mislead() -> None:
-    figures = plain(WAY_M + 500.0, at((3,), SIGMA_M, math.inf))
-    assert (figures["misleading_ticks"], figures["availability"]) == (1, 1 / TICKS)
+    values = plain(WAY_M + 500.0, at((3,), SIGMA_M, math.inf))
+    assert (values["misleading_ticks"], values["availability"]) == (1, 1 / TICKS)
 
 
 def test_a_position_that_is_no_number_misleads() -> None:
-    figures = plain(at((2, 5), math.nan, WAY_M))
-    assert (figures["misleading_ticks"], figures["wrong_track_ticks"]) == (2, 0)
-    assert figures["rmse_m"] == figures["max_m"] == 0.0
+    values = plain(at((2, 5), math.nan, WAY_M))
+    assert (values["misleading_ticks"], values["wrong_track_ticks"]) == (2, 0)
+    assert values["rmse_m"] == values["max_m"] == 0.0
 
 
 def test_a_position_on_a_track_that_does_not_exist_is_on_a_wrong_one() -> None:
-    figures = plain(WAY_M, track="elsewhere")
-    assert figures["wrong_track_ticks"] == figures["misleading_ticks"] == TICKS
-    assert figures["rmse_m"] is None
+    values = plain(WAY_M, track="elsewhere")
+    assert values["wrong_track_ticks"] == values["misleading_ticks"] == TICKS
+    assert values["rmse_m"] is None
 
 
 # At the junction of ``branch``, 760 m along main. Where the tracks are apart, zone5 begins on main
@@ -76,8 +76,8 @@ def forked(true_m: float, claimed_m: float, speed_mps: float = 0.0) -> dict[str,
     run = RunBuilder("branch", TICKS)
     run.moves("train_b", true_m, speed_mps, track="branch", path_m=JUNCTION_M + true_m)
     section = run.ranged("train_b", claimed_m, 0.1, track="main", channel=5.0).train("train_b")
-    figures: dict[str, Any] = section["phase_ranging"]
-    return figures
+    values: dict[str, Any] = section["phase_ranging"]
+    return values
 
 
 @pytest.mark.parametrize(("beyond_m", "wrong"), [(-0.01, 0), (0.01, TICKS)])
@@ -89,14 +89,14 @@ def test_past_the_junction_main_is_a_wrong_track_for_a_train_on_the_branch(
     way_m = HANDOVER_DEPTH_M + 0.5 + beyond_m
     true_m = ON_BRANCH.start_m + way_m
     assert JUNCTION_M + true_m > ON_MAIN.start_m
-    figures = forked(true_m, JUNCTION_M + true_m, speed_mps=5.0)
-    assert figures["wrong_track_ticks"] == figures["misleading_ticks"] == wrong
+    values = forked(true_m, JUNCTION_M + true_m, speed_mps=5.0)
+    assert values["wrong_track_ticks"] == values["misleading_ticks"] == wrong
 
 
 def test_before_the_junction_main_is_not_wrong() -> None:
     # zone7 follows zone4: what is told there is off by far, and on no wrong track.
-    figures = forked(ON_BRANCH.start_m + 50.0, 650.0)
-    assert (figures["wrong_track_ticks"], figures["misleading_ticks"]) == (0, TICKS)
+    values = forked(ON_BRANCH.start_m + 50.0, 650.0)
+    assert (values["wrong_track_ticks"], values["misleading_ticks"]) == (0, TICKS)
 
 
 def test_a_train_on_main_is_not_on_a_branch_that_it_never_takes() -> None:
@@ -120,14 +120,14 @@ def passing(channel_from_m: float, speed_mps: float = 20.0) -> dict[str, Any]:
 @pytest.mark.parametrize(("at_m", "missed"), [(221.5, 0), (222.5, 1)])
 def test_a_handover_is_missed_past_its_depth_and_a_tick_of_travel(at_m: float, missed: int) -> None:
     # 200 m, 20 m of depth and 2 m of travel in a tick; the train is at 222 m then.
-    figures = passing(at_m)
-    assert (figures["expected"], figures["missed"]) == (1, missed)
-    assert figures["made"] == 1 - missed
-    assert figures["wrong"] == 0
+    values = passing(at_m)
+    assert (values["expected"], values["missed"]) == (1, missed)
+    assert values["made"] == 1 - missed
+    assert values["wrong"] == 0
 
 
 @pytest.mark.parametrize(("at_m", "wrong"), [(179.0, 0), (177.0, 1)])
 def test_a_change_of_channel_far_from_the_station_is_wrong(at_m: float, wrong: int) -> None:
     # The next zone is near from 22 m before its station on: at 178 m it is not yet.
-    figures = passing(at_m)
-    assert (figures["wrong"], figures["missed"]) == (wrong, 0)
+    values = passing(at_m)
+    assert (values["wrong"], values["missed"]) == (wrong, 0)

@@ -57,25 +57,25 @@ def recording(
 
 
 def test_codes_are_counted_and_timed() -> None:
-    figures = code_metrics(SCENARIO, recording(), 1)["track_code"]
+    values = code_metrics(SCENARIO, recording(), 1)["track_code"]
     # 200 ticks of 5 m from the first of circuits of 500 m: two words.
-    assert (figures["sent"], figures["decoded"], figures["wrong"]) == (2, 2, 0)
-    assert figures["latency_s"] == pytest.approx(DELAY * TICK_S)
-    assert figures["latency_p95_s"] == pytest.approx(DELAY * TICK_S)
-    assert figures["availability"] == pytest.approx((200 - DELAY) / 200)
+    assert (values["sent"], values["decoded"], values["wrong"]) == (2, 2, 0)
+    assert values["latency_s"] == pytest.approx(DELAY * TICK_S)
+    assert values["latency_p95_s"] == pytest.approx(DELAY * TICK_S)
+    assert values["availability"] == pytest.approx((200 - DELAY) / 200)
 
 
 def test_a_word_that_was_never_there_is_wrong() -> None:
-    figures = code_metrics(SCENARIO, recording(wrong_at=50), 1)["track_code"]
-    assert figures["wrong"] == 1
+    values = code_metrics(SCENARIO, recording(wrong_at=50), 1)["track_code"]
+    assert values["wrong"] == 1
 
 
 def test_supervision_that_does_nothing_with_a_train_that_keeps_its_distance() -> None:
     length_m = SCENARIO.trains[0].vehicle.length_m
-    figures = code_metrics(SCENARIO, recording(), 1)["atp"]
-    assert figures["margin_min_m"] == pytest.approx(900.0 - length_m)
-    assert figures["entered_occupied"] == figures["interventions"] == 0
-    assert figures["overspeed_s"] == figures["above_permitted_s"] == 0.0
+    values = code_metrics(SCENARIO, recording(), 1)["atp"]
+    assert values["margin_min_m"] == pytest.approx(900.0 - length_m)
+    assert values["entered_occupied"] == values["interventions"] == 0
+    assert values["overspeed_s"] == values["above_permitted_s"] == 0.0
     assert code_metrics(SCENARIO, recording(), 0)["atp"]["margin_min_m"] is None
 
 
@@ -93,5 +93,5 @@ def test_interventions_are_counted_once_each() -> None:
     made = recording()
     for tick in (*range(40, 60), *range(80, 90)):
         made[COMMAND].put(tick, 1, np.array([0.0, 1.0, 1.0, float(tick >= 80)]))
-    figures = code_metrics(SCENARIO, made, 1)["atp"]
-    assert (figures["interventions"], figures["emergency_brakes"]) == (2, 1)
+    values = code_metrics(SCENARIO, made, 1)["atp"]
+    assert (values["interventions"], values["emergency_brakes"]) == (2, 1)

@@ -22,8 +22,8 @@ OLDEST = round(OLDEST_S / TICK_S)
 
 
 def code(run: RunBuilder, train: str = "follower") -> dict[str, Any]:
-    figures: dict[str, Any] = run.train(train)["track_code"]
-    return figures
+    values: dict[str, Any] = run.train(train)["track_code"]
+    return values
 
 
 def test_circuits_and_times_are_as_counted_on_below() -> None:
@@ -42,8 +42,8 @@ def test_a_word_is_wrong_once_it_was_at_the_antenna_too_long_ago(ticks: int, wro
     # The old word is at the antenna up to tick 9, and understood for so many ticks more.
     run = crossing(60, 10)
     told = np.where(np.arange(60) < 10 + ticks, 100.0, 101.0)
-    figures = code(run.understood("follower", told))
-    assert figures["wrong"] == wrong
+    values = code(run.understood("follower", told))
+    assert values["wrong"] == wrong
 
 
 def test_a_word_that_no_circuit_under_the_train_sent_is_wrong_at_once() -> None:

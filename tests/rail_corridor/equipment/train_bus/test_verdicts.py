@@ -20,8 +20,8 @@ TICKS = 100
 
 def bus(**more: Any) -> dict[str, Any]:
     run = RunBuilder("failing_bus", TICKS).bus("train_a", **more)
-    figures: dict[str, Any] = run.train("train_a")["train_bus"]
-    return figures
+    values: dict[str, Any] = run.train("train_a")["train_bus"]
+    return values
 
 
 def test_the_fault_begins_when_counted_on() -> None:
@@ -30,23 +30,23 @@ def test_the_fault_begins_when_counted_on() -> None:
 
 @pytest.mark.parametrize(("tick", "false"), [(FROM - 1, 1), (FROM, 0)])
 def test_a_fault_that_is_reported_before_there_is_one_is_false(tick: int, false: int) -> None:
-    figures = bus(kind=np.where(np.arange(TICKS) >= tick, LOOSE, 0.0), place_m=141.0)
-    assert len(figures["faults"]) == 1
-    assert figures["false_reports"] == false
-    assert figures["reported_s"] == (None if false else FROM * TICK_S)
+    values = bus(kind=np.where(np.arange(TICKS) >= tick, LOOSE, 0.0), place_m=141.0)
+    assert len(values["faults"]) == 1
+    assert values["false_reports"] == false
+    assert values["reported_s"] == (None if false else FROM * TICK_S)
 
 
 def test_each_change_of_mind_before_the_fault_is_one_more() -> None:
     kinds = np.zeros(TICKS)
     kinds[10:20], kinds[20:30], kinds[40:50], kinds[90:] = 1.0, 2.0, 1.0, LOOSE
-    figures = bus(kind=kinds, place_m=141.0)
-    assert (len(figures["faults"]), figures["false_reports"]) == (4, 3)
-    assert figures["reported_s"] == 90 * TICK_S
+    values = bus(kind=kinds, place_m=141.0)
+    assert (len(values["faults"]), values["false_reports"]) == (4, 3)
+    assert values["reported_s"] == 90 * TICK_S
 
 
 def test_lost_frames_and_wrong_bits_of_both_ends_are_counted() -> None:
-    figures = bus(lost=np.arange(TICKS) // 50, bit_errors=np.arange(TICKS) // 10)
-    assert (figures["lost"], figures["bit_errors"]) == (2, 18)
-    assert figures["first_loss_s"] == 50 * TICK_S
+    values = bus(lost=np.arange(TICKS) // 50, bit_errors=np.arange(TICKS) // 10)
+    assert (values["lost"], values["bit_errors"]) == (2, 18)
+    assert values["first_loss_s"] == 50 * TICK_S
     good = bus()
     assert (good["lost"], good["bit_errors"], good["first_loss_s"]) == (0, 0, None)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
-from rail_msgs_py.train_radio.safe_frame import Kind
+from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_onboard.train_radio.supervision import AuthoritySupervision
 from rail_onboard.train_radio.train_location import TrainLocation
 from rail_onboard.train_radio.train_protection import TrainIdentity, TrainProtection
-from rail_wayside.train_radio.authority_issuer import AuthorityDesk
+from rail_wayside.train_radio.authority_issuer import AuthorityIssuer
 from rail_wayside.train_radio.moving_block import MovingBlock
 from rail_wayside.train_radio.speed_profile import Segment
 from rail_wayside.train_radio.train_bounds import TrainStart
@@ -30,13 +30,14 @@ class Corridor:
         )
         draw = np.random.default_rng(7).bytes
         channels = {
-            n: SafeChannel(SECRET, CONTROLLER, n, (Kind.LOCATION_REPORT,), draw) for n in starts_m
+            n: SafeChannel(SECRET, CONTROLLER, n, (FrameKind.LOCATION_REPORT,), draw)
+            for n in starts_m
         }
-        self.desk = AuthorityDesk(block, channels, ["b1", "b2"])
+        self.desk = AuthorityIssuer(block, channels, ["b1", "b2"])
         self.trains = {
             n: TrainProtection(
                 TrainIdentity(n, 0, start_m, placed_m, LENGTH_M),
-                SafeChannel(SECRET, n, CONTROLLER, (Kind.MOVEMENT_AUTHORITY,), draw),
+                SafeChannel(SECRET, n, CONTROLLER, (FrameKind.MOVEMENT_AUTHORITY,), draw),
                 TrainLocation(0.02),
                 AuthoritySupervision(LENGTH_M),
             )
@@ -70,7 +71,9 @@ def test_trains_may_go_once_the_channels_stand() -> None:
     for _ in range(8):
         reasons = corridor.step()
     assert set(reasons.values()) == {""}
-    ends = {n: train.figures(corridor.tick * TICK_NS)[5] for n, train in corridor.trains.items()}
+    ends = {
+        n: train.state_values(corridor.tick * TICK_NS)[5] for n, train in corridor.trains.items()
+    }
     assert ends[1] == pytest.approx(3000.0 - 20.0)
     # Rear of the first, its uncertainty and the margin.
     assert 600.0 < ends[2] <= 1000.0 - LENGTH_M - 10.0
@@ -101,7 +104,7 @@ def test_counts_tell_what_was_lost() -> None:
         corridor.step(deaf=(2,))
     corridor.step()
     assert corridor.trains[2].counts[1] == before + 3
-    given = corridor.desk.given(2, corridor.tick * TICK_NS)
+    given = corridor.desk.authority_state(2, corridor.tick * TICK_NS)
     assert given.lost == 0 and given.accepted > 5 and given.rejected == 0
 
 
@@ -121,11 +124,11 @@ def test_a_range_that_contradicts_the_reports_is_not_told() -> None:
     corridor = Corridor(placed_m=5.0)
     for _ in range(8):
         corridor.step()
-    before = corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[3:5]
+    before = corridor.trains[1].state_values((corridor.tick - 1) * TICK_NS)[3:5]
     for _ in range(4):
         corridor.desk.ranged(1, corridor.tick * 0.25, 0, 1300.0, 0.01**2)
         corridor.step()
-    assert corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[3:5] == before
+    assert corridor.trains[1].state_values((corridor.tick - 1) * TICK_NS)[3:5] == before
     assert "report and range disagree" in corridor.desk.troubles(1)
 
 
@@ -136,5 +139,5 @@ def test_a_fix_moves_the_location() -> None:
     corridor.desk.ranged(1, 1.0, 0, 1000.4, 0.01**2)
     for _ in range(2):
         corridor.step()
-    front_m, half_m = corridor.trains[1].figures((corridor.tick - 1) * TICK_NS)[3:5]
+    front_m, half_m = corridor.trains[1].state_values((corridor.tick - 1) * TICK_NS)[3:5]
     assert abs(front_m - 1000.4) <= half_m < 2.0

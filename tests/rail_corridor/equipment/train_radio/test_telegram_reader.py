@@ -10,7 +10,13 @@ from hypothesis import strategies as st
 from rail_corridor.equipment.train_radio.telegram_reader import TelegramReader
 from rail_corridor.view.message_log import MOST_LINES, MessageLog
 from rail_msgs_py.train_radio.movement_authority import MovementAuthority
-from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES, VERSION, Header, Kind, write_header
+from rail_msgs_py.train_radio.safe_frame import (
+    FRAME_BYTES,
+    VERSION,
+    FrameKind,
+    Header,
+    write_header,
+)
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
 from rail_msgs_py.train_radio.train_channel import CONTROLLER_IDENTITY
 from rail_msgs_py.train_radio.train_report import LocationReport
@@ -31,8 +37,8 @@ def reader() -> TelegramReader:
 
 
 def test_a_report_and_an_authority_in_words(reader: TelegramReader) -> None:
-    report = frame(Kind.LOCATION_REPORT, 1, CONTROLLER_IDENTITY, REPORT.to_bytes())
-    authority = frame(Kind.MOVEMENT_AUTHORITY, CONTROLLER_IDENTITY, 2, AUTHORITY.to_bytes())
+    report = frame(FrameKind.LOCATION_REPORT, 1, CONTROLLER_IDENTITY, REPORT.to_bytes())
+    authority = frame(FrameKind.MOVEMENT_AUTHORITY, CONTROLLER_IDENTITY, 2, AUTHORITY.to_bytes())
     log = MessageLog()
     log.put(reader.entries("/first/atp/telegrams", telegrams(500_000_000, [(1, report)])))
     topic = "/wayside/zone_controller/base3/telegrams"

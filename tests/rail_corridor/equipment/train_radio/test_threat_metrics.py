@@ -19,13 +19,13 @@ from rail_corridor.run_data import RunData
 from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, REPORTS, STRIKES
 from rail_msgs_py.topics.world import STATE
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
-from rail_msgs_py.train_radio.safe_frame import Kind
+from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.telegrams import Telegrams
 from rail_msgs_py.train_radio.train_channel import CONTROLLER_IDENTITY
 from rail_onboard.train_radio.supervision import AuthoritySupervision
 from rail_onboard.train_radio.train_location import TrainLocation
 from rail_onboard.train_radio.train_protection import TrainIdentity, TrainProtection
-from rail_wayside.train_radio.authority_issuer import AuthorityDesk
+from rail_wayside.train_radio.authority_issuer import AuthorityIssuer
 from rail_wayside.train_radio.moving_block import MovingBlock
 from rail_wayside.train_radio.speed_profile import Segment
 from rail_wayside.train_radio.train_bounds import TrainStart
@@ -52,16 +52,16 @@ def ride(
     ticks: int = 240,
     end: type[SafeChannel] = SafeChannel,
     rate: float = 0.25,
-) -> tuple[RunData, AuthorityDesk]:
+) -> tuple[RunData, AuthorityIssuer]:
     """Two trains at a steady speed, the backbone and the desk, without the air between them."""
     draw = np.random.default_rng(7).bytes
     block = MovingBlock(
         [Segment(0, "main", 5200.0, ((0.0, 20.0),))],
         [TrainStart(n, f"t{n}", LENGTH_M, 1, 0, at_m, 1.0) for n, at_m in STARTS_M.items()],
     )
-    up, down = Kind.LOCATION_REPORT, Kind.MOVEMENT_AUTHORITY
+    up, down = FrameKind.LOCATION_REPORT, FrameKind.MOVEMENT_AUTHORITY
     channels = {n: end(SECRET, CONTROLLER_IDENTITY, n, (up,), draw) for n in STARTS_M}
-    desk = AuthorityDesk(block, channels, BASES)
+    issuer = AuthorityIssuer(block, channels, BASES)
     trains = {
         n: TrainProtection(
             TrainIdentity(n, 0, at_m, 1.0, LENGTH_M),
@@ -86,23 +86,23 @@ def ride(
             mine = [heard[base][n] for base in BASES if n in heard[base]]
             train.tick(now_ns, SPEED_MPS * TICK_S * tick, SPEED_MPS, mine)
             given[n] = train.frame(now_ns, SPEED_MPS)
-            made[ATP_STATE].put(tick, n - 1, np.array(train.figures(now_ns)))
+            made[ATP_STATE].put(tick, n - 1, np.array(train.state_values(now_ns)))
         rows: dict[int, list[tuple[float, ...]]] = {n: [] for n in trains}
         for base, arrived in net.up(now_ns, frames).items():
             for slot, frame in arrived:
-                taken = desk.receive(base, slot, frame, now_ns)
+                taken = issuer.receive(base, slot, frame, now_ns)
                 if taken is not None:
                     rows[slot].append((taken.sealed_s, *fields(taken.report)))
         for n, reports in rows.items():
             values = np.array(reports, dtype=float).reshape(-1, len(REPORTS.columns))
             made.events(REPORTS).put(tick, n - 1, values)
-        ordered = net.down(now_ns, desk.telegrams(now_ns))
+        ordered = net.down(now_ns, issuer.telegrams(now_ns))
         for n in trains:
-            made[AUTHORITY].put(tick, n - 1, np.array(desk.given(n, now_ns)))
+            made[AUTHORITY].put(tick, n - 1, np.array(issuer.authority_state(n, now_ns)))
         made[STATE].put(tick, slice(None), np.zeros((2, len(STATE.columns))))
         struck = [net.frames, *(net.strikes[threat] for threat in Threat)]
         made[STRIKES].put(tick, 0, np.array(struck, dtype=float))
-    return made, desk
+    return made, issuer
 
 
 def authorities(made: RunData) -> int:
@@ -112,12 +112,12 @@ def authorities(made: RunData) -> int:
 
 
 def test_without_threats_every_report_is_taken_and_none_is_forged() -> None:
-    made, desk = ride(())
+    made, issuer = ride(())
     for index in range(2):
-        figures = report_metrics(SCENARIO, made, index)
+        values = report_metrics(SCENARIO, made, index)
         # All but those sealed while the channels were made, and the last, which was not sent yet.
-        assert 230 < figures["reports_taken"] == desk.given(index + 1, 0).accepted
-        assert figures["forged_reports"] == 0
+        assert 230 < values["reports_taken"] == issuer.authority_state(index + 1, 0).accepted
+        assert values["forged_reports"] == 0
     assert authorities(made) == 0
     assert threat_metrics(made) == {
         "frames": 2 * (240 + 239),
@@ -126,12 +126,12 @@ def test_without_threats_every_report_is_taken_and_none_is_forged() -> None:
 
 
 def test_under_all_threats_none_is_forged_though_many_are_rejected() -> None:
-    made, desk = ride(Threat)
+    made, issuer = ride(Threat)
     for index in range(2):
-        figures = report_metrics(SCENARIO, made, index)
-        given = desk.given(index + 1, 0)
-        assert 60 < figures["reports_taken"] == given.accepted
-        assert figures["forged_reports"] == 0
+        values = report_metrics(SCENARIO, made, index)
+        given = issuer.authority_state(index + 1, 0)
+        assert 60 < values["reports_taken"] == given.accepted
+        assert values["forged_reports"] == 0
         assert given.rejected > 60
     assert authorities(made) == 0
     assert all(count > 150 for count in threat_metrics(made)["strikes"].values())

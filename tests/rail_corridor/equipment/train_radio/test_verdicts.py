@@ -161,8 +161,8 @@ def test_a_train_is_mislocated_outside_of_its_interval(
 
 def test_who_claims_nothing_is_not_mislocated() -> None:
     made = run().moves("second", AT_M).believed("second", math.nan, math.inf)
-    figures = made.train("second")["cbtc"]
-    assert (figures["mislocated"], figures["located"]) == (0, 0.0)
+    values = made.train("second")["cbtc"]
+    assert (values["mislocated"], values["located"]) == (0, 0.0)
     made.silent_protection("second", 0)
     assert made.train("second")["cbtc"]["mislocated"] == 0
 
@@ -200,17 +200,17 @@ def test_one_given_to_another_train_is_forged() -> None:
 
 def test_a_report_that_the_train_did_not_give_is_forged() -> None:
     made = run().reported("second", 4).reported("second", 5, offset_m=851.0)
-    figures = made.train("second")["cbtc"]
-    assert (figures["reports_taken"], figures["forged_reports"]) == (2, 1)
-    figures = run().reported("second", 4).reported("second", 5).train("second")["cbtc"]
-    assert (figures["reports_taken"], figures["forged_reports"]) == (2, 0)
+    values = made.train("second")["cbtc"]
+    assert (values["reports_taken"], values["forged_reports"]) == (2, 1)
+    values = run().reported("second", 4).reported("second", 5).train("second")["cbtc"]
+    assert (values["reports_taken"], values["forged_reports"]) == (2, 0)
 
 
 def test_time_without_an_authority_counts_past_its_age() -> None:
     age_s = np.full(TICKS, 3.0)
     age_s[4:10] = 3.0 + 1e-9
-    figures = run().believed("second", AT_M, age_s=age_s).train("second")["cbtc"]
-    assert figures["without_authority_s"] == 6 * TICK_S
+    values = run().believed("second", AT_M, age_s=age_s).train("second")["cbtc"]
+    assert values["without_authority_s"] == 6 * TICK_S
 
 
 # How fast, and how near ------------------------------------------------------------------

@@ -18,9 +18,9 @@ from rail_corridor.studies.link_margin.points import (
     rate_interval,
     scenario_data,
 )
-from rail_corridor.studies.link_margin.theory import Prediction, line_es_n0_db, theory
+from rail_corridor.studies.link_margin.theory import LinkPrediction, line_es_n0_db, theory
 
-TOLD = Prediction(12.0, 0.1, 0.2, 3.0)
+TOLD = LinkPrediction(12.0, 0.1, 0.2, 3.0)
 
 
 def train(passed_s: list[float | None], frames: int, lost: int) -> dict[str, Any]:

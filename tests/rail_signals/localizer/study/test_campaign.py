@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rail_signals.localizer.localizer import Localizer
-from rail_signals.localizer.protection_level import Reason
-from rail_signals.localizer.readings import TickReadings
+from rail_signals.localizer.protection_level import ProtectionReason
+from rail_signals.localizer.readings import TickMeasurements
 from rail_signals.localizer.settings import IntegrityClaim, LocalizerSettings, Sensor
 from rail_signals.localizer.study.campaign import Tally, stated_s, tally
 from rail_signals.localizer.study.faults import CASES, EFFECT, FaultKind, SensorFault
@@ -52,7 +52,7 @@ def test_without_a_fault_the_protection_level_holds_and_nothing_is_found(healthy
     assert healthy.false_alarms == healthy.wrong_exclusions == 0
     assert healthy.claimed > 0.99 * healthy.positions
     assert sum(healthy.reasons) == healthy.positions
-    assert healthy.reasons[Reason.NONE] == healthy.protected
+    assert healthy.reasons[ProtectionReason.NONE] == healthy.protected
     # As wide as the second-best sensor makes it, and far narrower than what is ever given.
     assert 4.0 < healthy.protection_m.mean() < 40.0
     assert np.sqrt(np.mean(healthy.error_m**2)) < 0.5
@@ -106,13 +106,13 @@ def test_false_alarms_are_no_more_than_stated() -> None:
         if tick == 0:
             localizer.place(truth.chainage_m[:, None], 2.0, sigma_mps=30.0)
         estimate = localizer.tick(tick * LINE.tick_s, readings)
-        alarms += int((estimate.found & ~before).sum())
-        positions += int((~estimate.found | ~before).sum())
-        before = estimate.found
+        alarms += int((estimate.detected & ~before).sum())
+        positions += int((~estimate.detected | ~before).sum())
+        before = estimate.detected
     assert 0 < alarms <= 0.01 * positions
 
 
-def one_run(readings: TickReadings, run: int) -> TickReadings:
+def one_run(readings: TickMeasurements, run: int) -> TickMeasurements:
     """Return the readings of one of many runs as a single train has them."""
     parts = []
     for reading in readings:
@@ -123,7 +123,7 @@ def one_run(readings: TickReadings, run: int) -> TickReadings:
         present = bool(reading.present[run, 0])
         values["present"] = True
         parts.append(reading._replace(**values) if present else None)
-    return TickReadings(*parts)
+    return TickMeasurements(*parts)
 
 
 def test_many_runs_at_once_are_as_one_by_one() -> None:

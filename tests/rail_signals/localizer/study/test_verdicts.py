@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rail_signals.localizer.protection_level import Estimate, Reason, Status
+from rail_signals.localizer.protection_level import Estimate, ProtectionReason, Status
 from rail_signals.localizer.settings import SENSORS, LocalizerSettings, Sensor
 from rail_signals.localizer.study import campaign
 from rail_signals.localizer.study.campaign import Tally, stated_s, tally
@@ -72,8 +72,8 @@ def scripted(script: Script) -> type:
                 "speed_high_mps": v + HALF_MPS,
                 "sigma_m": np.ones(RUNS),
                 "status": np.full(RUNS, int(Status.PROTECTED)),
-                "reason": np.full(RUNS, int(Reason.NONE)),
-                "found": np.zeros(RUNS, np.bool_),
+                "reason": np.full(RUNS, int(ProtectionReason.NONE)),
+                "detected": np.zeros(RUNS, np.bool_),
                 "excluded": np.zeros((RUNS, SENSORS), np.bool_),
                 "uncovered": np.zeros((RUNS, SENSORS), np.bool_),
             }
@@ -179,9 +179,9 @@ def test_what_is_not_claimed_is_not_exceeded(count: Any) -> None:
 
 def test_a_fault_that_is_found_before_there_is_one_is_a_false_alarm(count: Any) -> None:
     def script(tick: int, told: dict[str, Any]) -> None:
-        told["found"][0] = tick in (3, 4)
-        told["found"][1] = tick == BEGINS - 1
-        told["found"][2] = tick == BEGINS
+        told["detected"][0] = tick in (3, 4)
+        told["detected"][1] = tick == BEGINS - 1
+        told["detected"][2] = tick == BEGINS
 
     assert count(script).false_alarms == 2
     assert count(script, faulty=False).false_alarms == 3
@@ -204,7 +204,7 @@ def test_a_fault_is_found_late_after_the_stated_time(count: Any, waits: int, lat
     assert stated_s(Sensor.RANGE, FaultKind.JUMP) == 5.0
 
     def script(tick: int, told: dict[str, Any]) -> None:
-        told["found"][:] = tick >= BEGINS + waits
+        told["detected"][:] = tick >= BEGINS + waits
 
     counted = count(script, ticks=BEGINS + 60)
     assert (counted.due, counted.late) == (RUNS, late)

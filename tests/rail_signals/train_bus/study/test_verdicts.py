@@ -10,14 +10,14 @@ import pytest
 
 from rail_signals.train_bus.faults import place_of
 from rail_signals.train_bus.study import campaign
-from rail_signals.train_bus.study.campaign import HEALTHY, Case, Outcome, draw_case, examine
+from rail_signals.train_bus.study.campaign import HEALTHY, Case, CaseResult, draw_case, examine
 
 
-def outcome(monkeypatch: pytest.MonkeyPatch, case: Case, kind: str, error_m: float) -> Outcome:
+def outcome(monkeypatch: pytest.MonkeyPatch, case: Case, kind: str, error_m: float) -> CaseResult:
     """Return what is made of a case whose fault is reported so far from where it is."""
     found: Any = None
     if kind != HEALTHY:
-        at_m = 0.0 if case.fault is None else place_of(case.fault, case.consist.line())
+        at_m = 0.0 if case.fault is None else place_of(case.fault, case.consist.bus_line())
         found = SimpleNamespace(kind=kind, place_m=at_m + error_m)
     monkeypatch.setattr(campaign, "measure_consist", lambda *_: None)
     monkeypatch.setattr(campaign, "interpret", lambda *_: SimpleNamespace(finding=found))

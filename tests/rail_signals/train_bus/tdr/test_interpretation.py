@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rail_signals.train_bus.bus_line import BusLine, CableSection, Coupler, Stub, Termination
 from rail_signals.train_bus.consist import CarRun, Consist, Deviations, Tolerances
 from rail_signals.train_bus.faults import (
     KINDS,
@@ -21,7 +22,6 @@ from rail_signals.train_bus.faults import (
     WrongCable,
     place_of,
 )
-from rail_signals.train_bus.line import Coupler, Line, Section, Stub, Termination
 from rail_signals.train_bus.profile import load_bus_profile
 from rail_signals.train_bus.study.campaign import HEALTHY, Case, draw_case, draw_fault, examine
 from rail_signals.train_bus.study.detection_limits import detectable_size, fault_of_size
@@ -32,16 +32,16 @@ from rail_signals.train_bus.tdr.reflectometer import (
     measure,
     measure_consist,
 )
-from rail_signals.train_bus.tdr.run import read_run
+from rail_signals.train_bus.tdr.sequential_fit import Windows, fit_sequentially
+from rail_signals.train_bus.tdr.single_cable import read_single_cable
 from rail_signals.train_bus.tdr.verdict import RunMeasurement, judge, judge_train
-from rail_signals.train_bus.tdr.walk import Windows, walk
 
 CM2, CM4 = load_bus_profile("CM2"), load_bus_profile("CM4")
 PROFILES = [CM2, load_bus_profile("CM3"), CM4]
 CABLE = CM2.cable
 TRAIN = Consist(
     tuple(CarRun(CABLE, profile.length_m) for profile in PROFILES),
-    Stub(Section(CABLE, 0.4), Termination(10e3), 30e-12),
+    Stub(CableSection(CABLE, 0.4), Termination(10e3), 30e-12),
     Coupler(0.02, 80e-9, 10e-12),
     Termination(105.0),
 )
@@ -65,7 +65,7 @@ def test_each_kind(fault: BusFault) -> None:
     found = interpret(traces, TRAIN, INSTRUMENT)
     assert found.finding is not None
     assert found.finding.kind == fault.kind
-    assert found.finding.place_m == pytest.approx(place_of(fault, TRAIN.line()), abs=0.8)
+    assert found.finding.place_m == pytest.approx(place_of(fault, TRAIN.bus_line()), abs=0.8)
     assert found.finding.probability > 0.9
     assert found.is_explained
     verdicts = judge_train(found, TRAIN, PROFILES)
@@ -96,7 +96,7 @@ def test_a_healthy_train_is_measured() -> None:
     assert found.finding is None
     assert found.noise_ratio == pytest.approx(1.0, abs=0.1)
     assert not found.is_changing
-    sections = [e for e in TRAIN.line(BUILT).elements if isinstance(e, Section)]
+    sections = [e for e in TRAIN.bus_line(BUILT).elements if isinstance(e, CableSection)]
     for verdict, section in zip(judge_train(found, TRAIN, PROFILES), sections, strict=True):
         assert verdict.status == "pass"
         measured = verdict.measurement
@@ -113,7 +113,9 @@ def test_costs_of_healthy_trains_are_chi_square() -> None:
         rng = np.random.default_rng([14, seed])
         built = Deviations.draw(3, rng)
         trace = measure_consist(TRAIN, built, INSTRUMENT, rng).reflection[0]
-        walked = walk(Windows(TRAIN, INSTRUMENT, len(trace)), trace, INSTRUMENT.noise_rms)
+        walked = fit_sequentially(
+            Windows(TRAIN, INSTRUMENT, len(trace)), trace, INSTRUMENT.noise_rms
+        )
         assert walked.failed is None and walked.healthy is not None
         excess.append(walked.healthy.excess)
     assert np.mean(excess) == pytest.approx(0.0, abs=0.9)
@@ -173,10 +175,10 @@ def test_a_single_run(
     length_m: float, factor: float, end: float, fault: BusFault | None, status: str, told: str
 ) -> None:
     """Only the profile is known."""
-    line = Line((Section(CABLE, length_m, factor),), Termination(end))
+    bus_line = BusLine((CableSection(CABLE, length_m, factor),), Termination(end))
     samples = INSTRUMENT.samples_for(60.0 / CABLE.velocity_m_per_s)
-    traces = measure(line, INSTRUMENT, np.random.default_rng(17), 4, fault, samples)
-    reading = read_run(traces, CM2, INSTRUMENT)
+    traces = measure(bus_line, INSTRUMENT, np.random.default_rng(17), 4, fault, samples)
+    reading = read_single_cable(traces, CM2, INSTRUMENT)
     assert reading.end == told
     assert reading.verdict.status == status, reading.verdict
     measured = reading.verdict.measurement
@@ -188,7 +190,7 @@ def test_a_single_run(
     if fault is not None and not isinstance(fault, ShortCircuit):
         assert finding is not None
         assert finding.kind == fault.kind
-        assert finding.place_m == pytest.approx(place_of(fault, line), abs=0.4)
+        assert finding.place_m == pytest.approx(place_of(fault, bus_line), abs=0.4)
     else:
         assert finding is None
 

@@ -7,14 +7,16 @@ import math
 import numpy as np
 import pytest
 
+from rail_signals.train_bus.bus_line import BusLine, CableSection, SeriesElement, Termination
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.cascade import input_reflection
-from rail_signals.train_bus.line import Line, Section, SeriesElement, Termination
 from rail_signals.train_bus.tdr.measured_trace import from_ohms, step_answer, step_edge
 from rail_signals.train_bus.tdr.response import TimeGrid, lead_in_s, reflected_wave
 
 CABLE = Cable.from_impedance(110.0, 0.66, 0.05, 1e-9, 5e-5)
-LINE = Line((Section(CABLE, 20.0), SeriesElement(15.0), Section(CABLE, 27.0)), Termination(120.0))
+LINE = BusLine(
+    (CableSection(CABLE, 20.0), SeriesElement(15.0), CableSection(CABLE, 27.0)), Termination(120.0)
+)
 RISE_S = 20e-9
 
 
@@ -54,7 +56,7 @@ def test_ohms_become_reflections() -> None:
 
 
 @pytest.mark.parametrize(
-    ("frequency_hz", "line"),
+    ("frequency_hz", "bus_line"),
     [
         (np.concatenate((1e5 * np.arange(999), [3e8])), "must rise evenly"),
         (1e5 * np.arange(1000)[::-1], "must rise evenly"),
@@ -62,8 +64,8 @@ def test_ohms_become_reflections() -> None:
         (1e5 * np.arange(100), "must reach 7.58e"),
     ],
 )
-def test_frequencies_that_do_not_do(frequency_hz: np.ndarray, line: str) -> None:
-    with pytest.raises(ValueError, match=line):
+def test_frequencies_that_do_not_do(frequency_hz: np.ndarray, bus_line: str) -> None:
+    with pytest.raises(ValueError, match=bus_line):
         step_answer(frequency_hz, np.zeros(len(frequency_hz)), RISE_S, 5e-9)
 
 

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 
 from rail_signals.arrays import FloatArray
+from rail_signals.train_bus.bus_line import CableSection, Coupler, Stub, Termination
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.consist import COMMON, CarRun, Consist, Deviations, Tolerances
-from rail_signals.train_bus.line import Coupler, Section, Stub, Termination
+from rail_signals.train_bus.tdr.cable_substitution import CableSubstitution, likely_substitutions
+from rail_signals.train_bus.tdr.fault_scan import scan_faults, scan_water
 from rail_signals.train_bus.tdr.hypotheses import as_fault, clipped, place_m
 from rail_signals.train_bus.tdr.model import TraceModel
 from rail_signals.train_bus.tdr.parts import FaultGuess
 from rail_signals.train_bus.tdr.projection import Projection
 from rail_signals.train_bus.tdr.reflectometer import Reflectometer
 from rail_signals.train_bus.tdr.response import TimeGrid, reflected_wave
-from rail_signals.train_bus.tdr.scan import scan, scan_water
-from rail_signals.train_bus.tdr.swap import RunSwap, likely_swaps
-from rail_signals.train_bus.tdr.walk import Windows
+from rail_signals.train_bus.tdr.sequential_fit import Windows
 
 CABLE = Cable.from_impedance(120.0, 0.7, 0.0534, 0.0, 2.78e-4)
-NODE = Stub(Section(CABLE, 0.4), Termination(10e3), 30e-12)
+NODE = Stub(CableSection(CABLE, 0.4), Termination(10e3), 30e-12)
 SMOOTH = Tolerances(roughness=0.0)
 TRAIN = Consist(
     tuple(CarRun(CABLE, length) for length in (26.0, 47.0, 45.0, 28.0)),
@@ -32,7 +32,7 @@ TRAIN = Consist(
     SMOOTH,
 )
 INSTRUMENT = Reflectometer()
-SAMPLES = INSTRUMENT.samples_for(TRAIN.line().delay_s)
+SAMPLES = INSTRUMENT.samples_for(TRAIN.bus_line().delay_s)
 MODEL = TraceModel(TRAIN, INSTRUMENT, SAMPLES)
 BUILT = Deviations.draw(4, np.random.default_rng(5))
 VECTOR = BUILT.to_vector()
@@ -54,13 +54,13 @@ def name(guess: FaultGuess | None) -> str:
 
 def measured(guess: FaultGuess | None) -> FloatArray:
     """The trace without noise, of the line itself, by a transform of another length."""
-    line = TRAIN.line(BUILT)
+    bus_line = TRAIN.bus_line(BUILT)
     if guess is not None:
         loss = math.exp(SMOOTH.loss * BUILT.loss)
-        line = as_fault(TRAIN, guess, loss).apply(line)
+        bus_line = as_fault(TRAIN, guess, loss).apply(bus_line)
     start = INSTRUMENT.start_s + SMOOTH.trigger_s * BUILT.trigger
     grid = TimeGrid(2 * SAMPLES, INSTRUMENT.sample_period_s / 2, start)
-    wave = reflected_wave(line, grid, 120.0, INSTRUMENT.rise_time_s)[::2]
+    wave = reflected_wave(bus_line, grid, 120.0, INSTRUMENT.rise_time_s)[::2]
     return (1 + SMOOTH.gain * BUILT.gain) * wave + SMOOTH.offset * BUILT.offset
 
 
@@ -114,7 +114,7 @@ def test_a_window_needs_only_what_it_reaches() -> None:
 def test_another_cable_without_solving_the_line_again(run: int) -> None:
     windows = Windows(TRAIN, INSTRUMENT, SAMPLES)
     at = windows.fit(MODEL.trace(VECTOR), 1.0, 4, VECTOR, steps=0)
-    swap = RunSwap(MODEL, at, MODEL.fields(VECTOR), run)
+    swap = CableSubstitution(MODEL, at, MODEL.fields(VECTOR), run)
     guess = FaultGuess("wrong_cable", run, np.array([0.4, -0.25, 0.0, 0.0]))
     expected = MODEL.trace(VECTOR, guess) - MODEL.trace(VECTOR)
     np.testing.assert_allclose(swap.change(0.4, -0.25), expected, atol=1e-10)
@@ -128,7 +128,7 @@ def test_the_scan_finds_what_is_put_in() -> None:
     fields = MODEL.fields(drawn)
     splice = FaultGuess("bad_splice", 2, np.array([20.0, 0.5, 5.0]))
     at = windows.fit(MODEL.trace(drawn, splice), sigma, 4, drawn, steps=0)
-    found = scan(MODEL, at, fields, Projection(at))
+    found = scan_faults(MODEL, at, fields, Projection(at))
     peak = found.peaks(1, 5.0)[0]
     assert found.place_m[peak] == pytest.approx(93.0, abs=0.6)
     assert found.resistance_ohm[peak] == pytest.approx(0.5, rel=0.1)
@@ -136,7 +136,7 @@ def test_the_scan_finds_what_is_put_in() -> None:
     assert found.largest == pytest.approx(found.statistic[peak])
     other = FaultGuess("wrong_cable", 2, np.array([0.02, 0.0, 0.0, 0.0]))
     at = windows.fit(MODEL.trace(drawn, other), sigma, 4, drawn, steps=0)
-    found = scan(MODEL, at, fields, Projection(at))
+    found = scan_faults(MODEL, at, fields, Projection(at))
     assert int(found.run_statistic.argmax()) == 2
     wet = FaultGuess("water_ingress", 1, np.array([18.0, 7.0, 0.02, 0.0]))
     at = windows.fit(MODEL.trace(drawn, wet), sigma, 4, drawn, steps=0)
@@ -152,7 +152,7 @@ def test_likely_swaps_name_the_cable() -> None:
     drawn = np.zeros_like(VECTOR)
     guess = FaultGuess("wrong_cable", 1, np.array([-0.3, -0.4, 0.0, 0.0]))
     at = windows.fit(MODEL.trace(drawn, guess), 1e-3, 4, drawn, steps=0)
-    best = likely_swaps(MODEL, at, MODEL.fields(drawn), Projection(at), 1)[0]
+    best = likely_substitutions(MODEL, at, MODEL.fields(drawn), Projection(at), 1)[0]
     assert best[1] == -0.3
     assert best[2] == pytest.approx(-0.4, abs=0.04)
 

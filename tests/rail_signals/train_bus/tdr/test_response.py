@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import erf, erfc
 
+from rail_signals.train_bus.bus_line import BusLine, CableSection, Termination
 from rail_signals.train_bus.cable import Cable
-from rail_signals.train_bus.line import Line, Section, Termination
 from rail_signals.train_bus.tdr.response import (
     RISE_PER_SIGMA,
     TimeGrid,
@@ -37,8 +37,8 @@ def test_the_edge_rises_in_the_rise_time() -> None:
 )
 def test_an_end_is_seen_after_its_delay(load_ohm: float, rho: float) -> None:
     """A step that never returns to zero, and yet nothing folds back."""
-    line = Line((Section(CABLE, 47.0),), Termination(load_ohm))
-    wave = reflected_wave(line, GRID, 120.0, RISE_S)
+    bus_line = BusLine((CableSection(CABLE, 47.0),), Termination(load_ohm))
+    wave = reflected_wave(bus_line, GRID, 120.0, RISE_S)
     delay = 2 * 47.0 / CABLE.velocity_m_per_s
     np.testing.assert_allclose(wave, rho * edge(GRID.time_s - delay), atol=5e-6)
 
@@ -50,14 +50,14 @@ def test_an_end_is_seen_after_its_delay(load_ohm: float, rho: float) -> None:
 def test_echoes_of_the_cars(length_m: float, velocity_factor: float, echo_ns: float) -> None:
     """S2, Fig 6: 47 m and 27 m, in polyethylene and in the example's cable."""
     cable = Cable.from_impedance(120.0, velocity_factor)
-    wave = reflected_wave(Line((Section(cable, length_m),)), GRID, 120.0, RISE_S)
+    wave = reflected_wave(BusLine((CableSection(cable, length_m),)), GRID, 120.0, RISE_S)
     middle = np.interp(0.5, wave, GRID.time_s)
     assert float(middle) == pytest.approx(echo_ns * 1e-9, abs=0.1e-9)
 
 
 def test_echoes_between_a_wrong_source_and_an_open_end() -> None:
     """The lattice diagram: each round trip is one edge."""
-    wave = reflected_wave(Line((Section(CABLE, 30.0),)), GRID, 60.0, RISE_S)
+    wave = reflected_wave(BusLine((CableSection(CABLE, 30.0),)), GRID, 60.0, RISE_S)
     rho, delay = 1 / 3, 2 * 30.0 / CABLE.velocity_m_per_s
     expected = rho * edge(GRID.time_s)
     for k in range(1, 30):
@@ -74,7 +74,7 @@ def test_the_skin_effect_makes_an_erfc() -> None:
     skin, inductance, length = 1e-4, 0.9e-6, 400.0
     cable = Cable(inductance, inductance / 120.0**2, 0.0, 0.0, skin)
     grid = TimeGrid(3000, RISE_S / 5, -lead_in_s(RISE_S))
-    wave = reflected_wave(Line((Section(cable, length),)), grid, 120.0, RISE_S)
+    wave = reflected_wave(BusLine((CableSection(cable, length),)), grid, 120.0, RISE_S)
     a = skin / (2 * 120.0 * math.sqrt(math.pi))
     late = grid.time_s - 2 * length / cable.velocity_m_per_s
     head = skin * np.sqrt(np.maximum(grid.time_s, 0)) / (2 * math.pi * inductance)
@@ -86,9 +86,9 @@ def test_the_skin_effect_makes_an_erfc() -> None:
 
 
 def test_a_pulse_is_the_derivative_of_the_step() -> None:
-    line = Line((Section(CABLE, 20.0),), Termination(300.0))
-    step = reflected_wave(line, GRID, 120.0, RISE_S)
-    pulse = reflected_wave(line, GRID, 120.0, RISE_S, "pulse")
+    bus_line = BusLine((CableSection(CABLE, 20.0),), Termination(300.0))
+    step = reflected_wave(bus_line, GRID, 120.0, RISE_S)
+    pulse = reflected_wave(bus_line, GRID, 120.0, RISE_S, "pulse")
     slope = np.gradient(step, GRID.sample_period_s) * SIGMA_S * math.sqrt(2 * math.pi)
     np.testing.assert_allclose(pulse, slope, atol=0.02)
     late = GRID.time_s - 40.0 / CABLE.velocity_m_per_s
@@ -97,8 +97,8 @@ def test_a_pulse_is_the_derivative_of_the_step() -> None:
 
 
 def test_causal() -> None:
-    line = Line((Section(CABLE, 47.0),))
-    wave = reflected_wave(line, GRID, 120.0, RISE_S)
+    bus_line = BusLine((CableSection(CABLE, 47.0),))
+    wave = reflected_wave(bus_line, GRID, 120.0, RISE_S)
     before = GRID.time_s < 2 * 47.0 / CABLE.velocity_m_per_s - lead_in_s(RISE_S)
     assert before.sum() > 80
     assert np.abs(wave[before]).max() < 1e-5

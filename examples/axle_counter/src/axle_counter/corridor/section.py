@@ -10,8 +10,8 @@ from axle_counter.signals.axles import Cars
 from axle_counter.signals.wheel_sensor import WheelSensor
 from rail_corridor.scenario.faults import TimedFault
 from rail_corridor.scenario.model import Section
-from rail_corridor.scenario.section_fields import Frequency, Time, Whole
-from rail_world.line.description_base import Description, Name, Number
+from rail_corridor.scenario.section_fields import Frequency, StrictInt, Time
+from rail_world.line.description_base import Description, Name, StrictFloat
 
 _SENSOR, _CARS = WheelSensor(), Cars()
 
@@ -26,46 +26,46 @@ class SectionReset(Description):
 class AxleCounterPlan(Description):
     """Axle counters: detection points along every track, and the sections between them."""
 
-    length_m: Number = Field(
+    length_m: StrictFloat = Field(
         default=500.0, ge=20.0, le=1e5, description="no section is longer than this [m]"
     )
-    margin_m: Number = Field(
+    margin_m: StrictFloat = Field(
         default=100.0,
         ge=1.0,
         le=1e5,
         description="from the ends of a track to its first and last detection point [m]",
     )
-    car_m: Number = Field(
+    car_m: StrictFloat = Field(
         default=_CARS.length_m, ge=5.0, le=50.0, description="length of the cars, about [m]"
     )
     axles_per_car: Literal[2, 4, 6] = Field(
         default=4, description="axles of a car, half of them in each of two bogies"
     )
-    wheelbase_m: Number = Field(
+    wheelbase_m: StrictFloat = Field(
         default=_CARS.wheelbase_m, ge=1.0, le=5.0, description="of a bogie, first to last axle [m]"
     )
-    coil_spacing_m: Number = Field(
+    coil_spacing_m: StrictFloat = Field(
         default=_SENSOR.coil_spacing_m, ge=0.01, le=1.0, description="between the two coils [m]"
     )
-    pulse_m: Number = Field(
+    pulse_m: StrictFloat = Field(
         default=_SENSOR.pulse_m,
         ge=0.01,
         le=1.0,
         description="travel over which a wheel damps a coil [m]",
     )
-    threshold: Number = Field(
+    threshold: StrictFloat = Field(
         default=_SENSOR.threshold,
         ge=0.01,
         le=0.99,
         description="fraction of the damping by a wheel that switches a coil on",
     )
-    release: Number = Field(
+    release: StrictFloat = Field(
         default=_SENSOR.release, ge=0.01, le=0.99, description="... and that switches it off again"
     )
     sample_rate_hz: Frequency = Field(
         default=8000.0, description="sample rate of the amplitudes [Hz]"
     )
-    noise_v: Number = Field(
+    noise_v: StrictFloat = Field(
         default=0.005,
         ge=0.0,
         le=1.0,
@@ -117,10 +117,10 @@ class MissedAxles(TimedFault):
 
     kind: Literal["missed_axles"]
     point: Name = Field(description="detection point: dp1, dp2, ... in the order of the tracks")
-    every: Whole = Field(
+    every: StrictInt = Field(
         default=3, ge=1, le=1000, description="the axle of a train that is missed, and each so many"
     )
-    left: Number = Field(
+    left: StrictFloat = Field(
         default=0.1, ge=0.0, le=1.0, description="what is left of the damping by such an axle"
     )
 
@@ -130,7 +130,7 @@ class RailBrake(TimedFault):
 
     kind: Literal["rail_brake"]
     train: Name = Field(description="the train")
-    length_m: Number = Field(default=1.0, ge=0.1, le=2.0, description="of a magnet [m]")
+    length_m: StrictFloat = Field(default=1.0, ge=0.1, le=2.0, description="of a magnet [m]")
 
 
 AXLE_COUNTERS: Final[Section[AxleCounterPlan | None]] = Section(

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from axle_counter.signals.axles import Cars
 from axle_counter.signals.wheel_sensor import WheelSensor
-from rail_world.line.description_base import Chainage, Description, Name, Number
+from rail_world.line.description_base import Chainage, Description, Name, StrictFloat
 
 
 class SensorPlace(Description):
@@ -24,10 +24,10 @@ class MissedAxlesAct(Description):
 
     kind: Literal["missed_axles"] = "missed_axles"
     point: Name
-    from_s: Number
-    to_s: Number
+    from_s: StrictFloat
+    to_s: StrictFloat
     every: int = Field(ge=1)
-    left: Number = Field(ge=0.0, le=1.0)
+    left: StrictFloat = Field(ge=0.0, le=1.0)
 
 
 class RailBrakeAct(Description):
@@ -35,9 +35,9 @@ class RailBrakeAct(Description):
 
     kind: Literal["rail_brake"] = "rail_brake"
     train: Name
-    from_s: Number
-    to_s: Number
-    length_m: Number = Field(gt=0.0)
+    from_s: StrictFloat
+    to_s: StrictFloat
+    length_m: StrictFloat = Field(gt=0.0)
 
 
 class WheelSensorDescription(Description):
@@ -46,8 +46,8 @@ class WheelSensorDescription(Description):
     sensor: WheelSensor
     places: tuple[SensorPlace, ...] = Field(min_length=1)
     cars: Cars
-    sample_rate_hz: Number = Field(gt=0.0)
-    noise_v: Number = Field(ge=0.0)
+    sample_rate_hz: StrictFloat = Field(gt=0.0)
+    noise_v: StrictFloat = Field(ge=0.0)
     missed_axles: tuple[MissedAxlesAct, ...] = ()
     rail_brakes: tuple[RailBrakeAct, ...] = ()
 

@@ -43,9 +43,11 @@ def fix_rows(row: Mapping[str, float]) -> Rows:
     """A position by Doppler shifts, or why there is none."""
     reason, tones = int(row["reason"]), ["tones found", f"{row['tones']:.0f}", ""]
     if reason or not math.isfinite(row["chainage_m"]):
-        from rail_signals.doppler.solver import Reason  # brings SciPy, which takes time to load
+        from rail_signals.doppler.solver import (
+            NoFixReason,
+        )  # brings SciPy, which takes time to load
 
-        names = {int(member): member.name for member in Reason}
+        names = {int(member): member.name for member in NoFixReason}
         why = names.get(reason, f"reason {reason}").lower().replace("_", " ")
         return [["position", f"none: {why}", ""], tones]
     sigma_m, sigma_mps = (math.sqrt(row[column]) for column in ("chainage_m2", "speed_m2ps2"))

@@ -37,18 +37,18 @@ def _placed(scenario: Scenario) -> tuple[Reference, ...]:
 
 
 def place_references(network: Network, plan: ReferencePlan) -> tuple[Reference, ...]:
-    """Reference stations from the begin to the end of every track, evenly, tones in turn."""
-    found: list[Reference] = []
+    """Reference stations from the start to the end of every track, evenly, tones in turn."""
+    references: list[Reference] = []
     for name, track in network.tracks.items():
         cells = max(1, math.ceil(track.length_m / plan.spacing_m - 1e-9))
         for index in range(cells + 1):
             chainage_m = index * track.length_m / cells
             pose = track.pose(chainage_m)
             # Positive is to the left.
-            aside_m = plan.offset_m * (1.0 if len(found) % 2 else -1.0)
+            aside_m = plan.offset_m * (1.0 if len(references) % 2 else -1.0)
             x = float(pose.x_m) - aside_m * math.sin(float(pose.heading_rad))
             y = float(pose.y_m) + aside_m * math.cos(float(pose.heading_rad))
             place = (x, y, float(pose.z_m) + plan.height_m)
-            slot = len(found) % plan.slots
-            found.append(Reference(f"ref{len(found) + 1}", name, chainage_m, place, slot))
-    return tuple(found)
+            slot = len(references) % plan.slots
+            references.append(Reference(f"ref{len(references) + 1}", name, chainage_m, place, slot))
+    return tuple(references)

@@ -41,10 +41,10 @@ class ReferencedTrack:
         described, plan = reference_description(scenario), REFERENCES.of(scenario)
         if described is None or plan is None:
             raise ValueError(f"{scenario.name} has no reference stations")
-        way = scenario.network.tracks[track]
-        s = np.linspace(0.0, way.length_m, int(np.ceil(way.length_m / _STEP_M)) + 1)
-        pose = way.pose(s)
-        stations = tuple(found for found in references_of(scenario) if found.track == track)
+        line = scenario.network.tracks[track]
+        s = np.linspace(0.0, line.length_m, int(np.ceil(line.length_m / _STEP_M)) + 1)
+        pose = line.pose(s)
+        stations = tuple(one for one in references_of(scenario) if one.track == track)
         return cls(
             plan,
             SurveyedLine(s, pose.x_m, pose.y_m, pose.z_m, pose.heading_rad),
@@ -69,18 +69,22 @@ class ReferencedTrack:
             chainage_m,
             speed_mps,
             self.variance_hz2(chainage_m),
-            reach_m=self.plan.reach_m,
+            coverage_range_m=self.plan.coverage_range_m,
             offset_sigma_hz=self._offset_hz,
             speed_sigma_mps=self._speed_mps,
         )
 
     def run_bound_m(
-        self, chainage_m: FloatArray, speed_mps: FloatArray, given: NDArray[np.bool_], step_s: float
+        self,
+        chainage_m: FloatArray,
+        speed_mps: FloatArray,
+        available: NDArray[np.bool_],
+        step_s: float,
     ) -> FloatArray:
         """Bound of the positions of a run [blocks] [m], as a positioner makes them.
 
-        It carries the offset on from each block that has `given` a position to the next, `step_s`
-        later, and nothing else.
+        It carries the offset on from each block that has `available` a position to the next,
+        `step_s` later, and nothing else.
         """
         information = shift_information(
             self.plan.tones,
@@ -89,11 +93,11 @@ class ReferencedTrack:
             chainage_m,
             speed_mps,
             self.variance_hz2(chainage_m),
-            reach_m=self.plan.reach_m,
+            coverage_range_m=self.plan.coverage_range_m,
         )
         return tracked_bound_m(
             information,
-            given,
+            available,
             offset_sigma_hz=self._offset_hz,
             walk_hz=RECEIVER_WALK.default * step_s**0.5,
             speed_sigma_mps=self._speed_mps,

@@ -37,16 +37,16 @@ def doppler_bound_m(scenario: Scenario, recording: RunData, index: int) -> Float
     mine = recording[STATE].upto(recording.ticks)[:, index]
     on_line = mine[:, STATE.index["on_line"]] > 0.0
     fixes = recording[DOPPLER_FIX].upto(recording.ticks)[:, index]
-    given = on_line & (fixes[:, DOPPLER_FIX.index["reason"]] == 0.0)
+    available = on_line & (fixes[:, DOPPLER_FIX.index["reason"]] == 0.0)
     bound_m = np.full(len(mine), np.nan)
-    if given.any():
+    if available.any():
         here = ReferencedTrack.of(scenario, scenario.trains[index].route[0])
         front_m, speed_mps = (
             mine[on_line, STATE.index[name]] for name in ("chainage_m", "speed_mps")
         )
-        positions = given[on_line]
+        positions = available[on_line]
         bounds_m = here.run_bound_m(front_m, speed_mps, positions, scenario.tick_s)
-        bound_m[given] = bounds_m[positions]
+        bound_m[available] = bounds_m[positions]
     return bound_m
 
 

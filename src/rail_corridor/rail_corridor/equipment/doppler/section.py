@@ -10,35 +10,35 @@ from pydantic import Field, model_validator
 
 from rail_corridor.scenario.faults import TimedFault
 from rail_corridor.scenario.model import Section
-from rail_corridor.scenario.section_fields import Whole
+from rail_corridor.scenario.section_fields import StrictInt
 from rail_msgs_py.doppler import quantities
 from rail_signals.doppler.tone_plan import TonePlan
-from rail_world.line.description_base import Description, Name, Number, field_of
+from rail_world.line.description_base import Description, Name, StrictFloat, field_of
 
 
 class ReferencePlan(Description):
     """Reference stations, by whose Doppler shifts trains find their place (Kim et al.)."""
 
-    spacing_m: Number = Field(
+    spacing_m: StrictFloat = Field(
         default=600.0, ge=50.0, le=20_000.0, description="no station is farther apart [m]"
     )
-    offset_m: Number = field_of(quantities.OFFSET)
-    height_m: Number = field_of(quantities.HEIGHT)
-    carrier_hz: Number = field_of(quantities.CARRIER)
-    sample_rate_hz: Number = field_of(quantities.SAMPLE_RATE)
-    samples: Whole = field_of(quantities.SAMPLES)
-    slots: Whole = field_of(quantities.SLOTS)
-    slot_spacing_hz: Number = field_of(quantities.SLOT_SPACING)
-    power_dbm: Number = field_of(quantities.POWER)
-    noise_figure_db: Number = field_of(quantities.NOISE_FIGURE)
-    path_loss_exponent: Number = field_of(quantities.PATH_LOSS_EXPONENT)
-    extra_loss_db: Number = field_of(quantities.EXTRA_LOSS)
-    reach_spacings: Number = Field(
-        default=2.5, ge=1.0, le=10.0, description="nothing is heard past so many spacings"
+    offset_m: StrictFloat = field_of(quantities.OFFSET)
+    height_m: StrictFloat = field_of(quantities.HEIGHT)
+    carrier_hz: StrictFloat = field_of(quantities.CARRIER)
+    sample_rate_hz: StrictFloat = field_of(quantities.SAMPLE_RATE)
+    samples: StrictInt = field_of(quantities.SAMPLES)
+    slots: StrictInt = field_of(quantities.SLOTS)
+    slot_spacing_hz: StrictFloat = field_of(quantities.SLOT_SPACING)
+    power_dbm: StrictFloat = field_of(quantities.POWER)
+    noise_figure_db: StrictFloat = field_of(quantities.NOISE_FIGURE)
+    path_loss_exponent: StrictFloat = field_of(quantities.PATH_LOSS_EXPONENT)
+    extra_loss_db: StrictFloat = field_of(quantities.EXTRA_LOSS)
+    reach_spacings: StrictFloat = Field(
+        default=2.5, ge=1.0, le=10.0, description="nothing is received beyond this many spacings"
     )
-    receiver_ppm: Number = field_of(quantities.RECEIVER_OFFSET)
-    station_ppb: Number = field_of(quantities.STATION_OFFSET)
-    fastest_kmh: Number = field_of(quantities.FASTEST)
+    receiver_ppm: StrictFloat = field_of(quantities.RECEIVER_OFFSET)
+    station_ppb: StrictFloat = field_of(quantities.STATION_OFFSET)
+    fastest_kmh: StrictFloat = field_of(quantities.FASTEST)
 
     @model_validator(mode="after")
     def _makes_tones(self) -> ReferencePlan:
@@ -50,12 +50,12 @@ class ReferencePlan(Description):
             raise ValueError(f"{known.get(field, field)}: {reason}") from None
         most = 2.0 * self.reach_spacings + 1.0
         if self.slots < most:
-            raise ValueError(f"slots: {most:g} stations may be heard at once")
+            raise ValueError(f"slots: {most:g} stations may be received at once")
         return self
 
     @property
-    def reach_m(self) -> float:
-        """Distance past which nothing is heard [m]."""
+    def coverage_range_m(self) -> float:
+        """Distance beyond which nothing is received [m]."""
         return self.reach_spacings * self.spacing_m
 
     @cached_property
@@ -85,7 +85,7 @@ class DetunedReference(TimedFault):
 
     kind: Literal["detuned_reference"]
     station: Name = Field(description="its name: ref1, ref2, ... in the order of the tracks")
-    shift_hz: Number = field_of(quantities.DETUNING)
+    shift_hz: StrictFloat = field_of(quantities.DETUNING)
 
 
 REFERENCES: Final[Section[ReferencePlan | None]] = Section(

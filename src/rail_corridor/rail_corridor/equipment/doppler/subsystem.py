@@ -26,7 +26,7 @@ from .section import REFERENCES, DeadReference, DetunedReference
 from .world import reference_description
 
 
-class Doppler(Subsystem):
+class DopplerSubsystem(Subsystem):
     """Reference stations by whose Doppler shifts trains find their place."""
 
     name = "doppler"
@@ -120,4 +120,4 @@ class Doppler(Subsystem):
         return DopplerFigures()
 
 
-DOPPLER: Final = Doppler()
+DOPPLER: Final = DopplerSubsystem()

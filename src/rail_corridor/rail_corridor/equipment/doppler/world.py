@@ -33,7 +33,7 @@ def reference_description(scenario: Scenario) -> ReferenceDescription | None:
         noise_figure_db=plan.noise_figure_db,
         path_loss_exponent=plan.path_loss_exponent,
         extra_loss_db=plan.extra_loss_db,
-        reach_m=plan.reach_m,
+        coverage_range_m=plan.coverage_range_m,
         receiver_ppm=plan.receiver_ppm,
         station_ppb=plan.station_ppb,
         faults=tuple(ReferenceFault(**fault.model_dump()) for fault in faults),

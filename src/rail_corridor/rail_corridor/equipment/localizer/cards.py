@@ -23,7 +23,7 @@ from rail_corridor.equipment.live_elements import (
 )
 from rail_corridor.equipment.live_state import LiveState
 from rail_msgs_py.table import Table
-from rail_msgs_py.topics.localizer import LOCALIZER_STATE, TOLD_POSITION
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE, RELAYED_RANGE
 
 from .live_estimate import LocalizerEstimate, error_of, estimate_of, read_estimate
 
@@ -73,8 +73,8 @@ class LocalizerView(LiveView):
             _interval_gauge,
         ),
         TableCard(
-            TOLD_POSITION,
-            "Position told over the radio",
+            RELAYED_RANGE,
+            "Position relayed by radio",
             CardGroup.ONBOARD_POSITION,
             lambda _state, _train, row: told_rows(row),
         ),

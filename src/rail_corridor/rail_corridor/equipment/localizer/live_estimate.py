@@ -104,9 +104,9 @@ def _words(reason: int, excluded: int) -> tuple[str, tuple[str, ...]]:
     """Reason and excluded sensors; what counts them brings SciPy, which takes time to load."""
     if not reason and not excluded:
         return "", ()
-    from rail_signals.localizer.protection_level import Reason
+    from rail_signals.localizer.protection_level import ProtectionReason
     from rail_signals.localizer.settings import Sensor
 
-    known = {int(member): member.name for member in Reason}
+    known = {int(member): member.name for member in ProtectionReason}
     why = known.get(reason, f"reason {reason}").lower().replace("_", " ") if reason else ""
     return why, tuple(s.name.lower() for s in Sensor if excluded >> int(s) & 1)

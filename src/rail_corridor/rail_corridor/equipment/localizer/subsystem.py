@@ -28,7 +28,7 @@ from .section import LOCALIZER_SECTION
 _READERS: Final = ("atp", "code_supervision", "doppler_positioner")
 
 
-class Localizer(Subsystem):
+class LocalizerSubsystem(Subsystem):
     """One position on board from all sensors, which trains then run on."""
 
     name = "localizer"
@@ -98,4 +98,4 @@ class Localizer(Subsystem):
         return interval_markers(scene)
 
 
-LOCALIZER: Final = Localizer()
+LOCALIZER: Final = LocalizerSubsystem()

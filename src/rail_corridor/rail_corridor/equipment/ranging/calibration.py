@@ -1,8 +1,8 @@
-"""The bench: measures the delay of each transponder before its train goes into service.
+"""The calibration rig: measures the delay of each transponder before its train goes into service.
 
 The delay of a transponder counts like distance: 1 us is 150 m. Units differ by nanoseconds, so
 each is measured over a cable of known length and trimmed to the delay of the fleet, which the
-stations then take off. What the bench's own noise leaves is the residual.
+stations then take off. What the rig's own noise leaves is the residual.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import numpy as np
 
 from rail_corridor.scenario.model import Scenario
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.ranging.receiver import LineReceiver
+from rail_signals.ranging.receiver import FmToneReceiver
 from rail_signals.ranging.signal import RangingSignal, modulate
 from rail_signals.ranging.transponder import calibrate_delay
 
 from .section import SIGNAL, TRANSPONDER, TransponderPlan
 
-BENCH_SNR = 1e4  # 40 dB per sample over the cable
+RIG_SNR = 1e4  # 40 dB per sample over the cable
 
 
 @dataclass(frozen=True)
 class Transponder:
-    """One unit: its true delay, the trim found on the bench, and what error that leaves."""
+    """One unit: its true delay, the trim that calibration found, and the error left."""
 
     delay_s: float
     trim_s: float
@@ -54,16 +54,16 @@ def calibrate(
     Parameters
     ----------
     plan : TransponderPlan
-        Nominal delay, spread of the units, bursts on the bench.
+        Nominal delay, spread of the units, bursts on the calibration rig.
     signal : RangingSignal
     rng : Generator
-        Draws the unit and the noise of the bench.
+        Draws the unit and the noise of the rig.
     """
     delay_s = max(0.0, plan.delay_s + plan.spread_s * float(rng.standard_normal()))
     lag_rad = 2.0 * np.pi * np.asarray(signal.tones_hz) * delay_s
-    noise = rng.standard_normal((plan.bench_bursts, signal.samples, 2)).view(np.complex128)
-    bursts = modulate(signal, lag_rad) + noise[..., 0] * np.sqrt(0.5 / BENCH_SNR)
-    estimate = LineReceiver(signal).estimate(bursts)
+    noise = rng.standard_normal((plan.calibration_bursts, signal.samples, 2)).view(np.complex128)
+    bursts = modulate(signal, lag_rad) + noise[..., 0] * np.sqrt(0.5 / RIG_SNR)
+    estimate = FmToneReceiver(signal).estimate(bursts)
     measured_s, variance_s2 = calibrate_delay(
         estimate.phase_lag_rad,
         estimate.variance_rad2,

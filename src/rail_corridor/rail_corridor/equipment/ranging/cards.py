@@ -158,7 +158,7 @@ def _range_cards(state: LiveState, train: str) -> Iterable[Card]:
             sigma_m = math.sqrt(reading.variance_m2)
             rows = [["range", f"{reading.range_m:.2f} ± {sigma_m:.2f}", "m"]]
         else:
-            rows = [["range", "disturbed" if reading.disturbed else "nothing heard", ""]]
+            rows = [["range", "disturbed" if reading.disturbed else "no signal", ""]]
         title = f"Range by {RANGE.parts(name)['site']}, {reading.zone}"
         yield Card(title, name, reading.stamp_ns, CardGroup.WAYSIDE_POSITION, rows)
 

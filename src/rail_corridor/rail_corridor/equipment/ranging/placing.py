@@ -111,12 +111,12 @@ def place_by_hand(
     """Take the stations as they are given; junctions name theirs by the branch."""
     positions = plan.positions or ()
     places: dict[str, list[Place]] = {track: [] for track in order}
-    given: dict[str, str] = {}
+    fields: dict[str, str] = {}
     for index, position in enumerate(positions):
         field = f"stations.positions.{index}"
-        if position.name in given:
+        if position.name in fields:
             raise InputError("another station has it", field=f"{field}.name", value=position.name)
-        given[position.name] = field
+        fields[position.name] = field
         if position.junction is not None:
             point = fouling.get(position.junction)
             if point is None:
@@ -160,8 +160,8 @@ def _completed(
     fouling: dict[str, FoulingPoint],
 ) -> dict[str, list[Place]]:
     """Sort the places of every track, see that the first is there, and name unnamed zones."""
-    taken = {place.zone for here in places.values() for place in here}
-    free = (f"zone{n}" for n in range(1, 10_000) if f"zone{n}" not in taken)
+    occupied = {place.zone for here in places.values() for place in here}
+    free = (f"zone{n}" for n in range(1, 10_000) if f"zone{n}" not in occupied)
     for track in order:
         first_m = anchors[track][0][0]
         here = sorted(places[track], key=lambda place: place.at_m)

@@ -33,7 +33,7 @@ _MISLEADING_M = 1.0
 
 
 @dataclass(frozen=True)
-class _Run:
+class _TrainRun:
     """The columns of one train, arrays over the ticks."""
 
     path_m: FloatArray
@@ -83,9 +83,9 @@ def position_errors(scenario: Scenario, recording: RunData, index: int) -> Posit
     return _position_errors(scenario, recording, index, run, zones, along_m, channel)
 
 
-def _run_of(recording: RunData, index: int) -> _Run:
+def _run_of(recording: RunData, index: int) -> _TrainRun:
     state = recording[STATE].upto(recording.ticks)[:, index]
-    return _Run(
+    return _TrainRun(
         state[:, STATE.index["path_m"]],
         state[:, STATE.index["track_index"]],
         state[:, STATE.index["chainage_m"]],
@@ -95,7 +95,7 @@ def _run_of(recording: RunData, index: int) -> _Run:
 
 
 def _places_of(
-    layout: Layout, tracks: tuple[str, ...], run: _Run
+    layout: Layout, tracks: tuple[str, ...], run: _TrainRun
 ) -> tuple[list[Zone | None], FloatArray]:
     """Zone that the train is in at each tick, and the chainage [tick] along that zone's track.
 
@@ -169,7 +169,7 @@ def handovers(
         "made": made,
         "missed": expected - made,
         "wrong": wrong,
-        "furthest_m": _figure(furthest_m) if furthest_m is not None else None,
+        "furthest_m": _finite_or_none(furthest_m) if furthest_m is not None else None,
     }
 
 
@@ -186,7 +186,7 @@ def _position_errors(
     scenario: Scenario,
     recording: RunData,
     index: int,
-    run: _Run,
+    run: _TrainRun,
     zones: list[Zone | None],
     along_m: FloatArray,
     channel: FloatArray,
@@ -218,23 +218,25 @@ def _position_errors(
     return PositionErrors(run.path_m, run.on_line, known, wrong_track, usable, error_m, bound_m2)
 
 
-def _ranging(recording: RunData, index: int, found: PositionErrors) -> dict[str, Any]:
+def _ranging(recording: RunData, index: int, errors: PositionErrors) -> dict[str, Any]:
     """Position by phase ranging against the truth and against what the links allow."""
     variance_m2 = recording[POSITION].upto(recording.ticks)[:, index, 2]
-    error_m, usable, known = found.error_m, found.usable, found.known
+    error_m, usable, known = errors.error_m, errors.usable, errors.known
     with np.errstate(invalid="ignore"):
-        bounded = usable & np.isfinite(found.bound_m2)
+        bounded = usable & np.isfinite(errors.bound_m2)
         normalised = error_m[usable] ** 2 / variance_m2[usable]
         allowed_m = _MISLEADING_M + _MISLEADING_SIGMAS * np.sqrt(variance_m2)
         misleading = known & ~(usable & (np.abs(error_m) <= allowed_m))
     return {
-        "availability": _ratio(int(np.count_nonzero(known)), int(np.count_nonzero(found.on_line))),
+        "availability": _ratio(int(np.count_nonzero(known)), int(np.count_nonzero(errors.on_line))),
         "rmse_m": _rms(error_m[usable]),
-        "bound_m": _root_mean(found.bound_m2[bounded]),
-        "p95_m": _figure(np.quantile(np.abs(error_m[usable]), 0.95)) if usable.any() else None,
-        "max_m": _figure(np.max(np.abs(error_m[usable]))) if usable.any() else None,
+        "bound_m": _root_mean(errors.bound_m2[bounded]),
+        "p95_m": _finite_or_none(np.quantile(np.abs(error_m[usable]), 0.95))
+        if usable.any()
+        else None,
+        "max_m": _finite_or_none(np.max(np.abs(error_m[usable]))) if usable.any() else None,
         "normalised_error": _root_mean(normalised),
-        "wrong_track_ticks": int(np.count_nonzero(found.wrong_track)),
+        "wrong_track_ticks": int(np.count_nonzero(errors.wrong_track)),
         "misleading_ticks": int(np.count_nonzero(misleading)),
     }
 
@@ -254,7 +256,7 @@ def _bound_m2(
     scenario: Scenario,
     recording: RunData,
     index: int,
-    run: _Run,
+    run: _TrainRun,
     zones: list[Zone | None],
     channel: FloatArray,
     links: FloatArray,
@@ -262,10 +264,10 @@ def _bound_m2(
     """Cramér-Rao bound of the chainage at each tick: that of the range over its slope."""
     signal = SIGNAL.of(scenario).signal
     down, up = links[:, LINKS.index["snr_down"]], links[:, LINKS.index["snr_up"]]
-    heard = (down > 0.0) & (up > 0.0)
+    received = (down > 0.0) & (up > 0.0)
     bound = np.full(len(down), np.inf)
-    bound[heard] = two_way_range_variance_bound(
-        down[heard], up[heard], signal.samples, signal.indices[0], signal.tones_hz[0]
+    bound[received] = two_way_range_variance_bound(
+        down[received], up[received], signal.samples, signal.indices[0], signal.tones_hz[0]
     )
     slope = np.full(len(down), np.nan)
     state = recording[STATE].upto(recording.ticks)[:, index]
@@ -297,18 +299,18 @@ def _ranging_zone(layout: Layout, zone: Zone | None, channel: float) -> Zone | N
 
 
 def _rms(values: FloatArray) -> float | None:
-    return _figure(math.sqrt(float(np.mean(values**2)))) if values.size else None
+    return _finite_or_none(math.sqrt(float(np.mean(values**2)))) if values.size else None
 
 
 def _root_mean(values: FloatArray) -> float | None:
-    return _figure(math.sqrt(float(np.mean(values)))) if values.size else None
+    return _finite_or_none(math.sqrt(float(np.mean(values)))) if values.size else None
 
 
 def _ratio(part: int, whole: int) -> float | None:
     return part / whole if whole else None
 
 
-def _figure(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 

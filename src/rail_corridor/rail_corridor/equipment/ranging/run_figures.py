@@ -34,14 +34,14 @@ class RangingFigures(RunFigures):
 
     def error_panel(self, run: FigureData, train: int) -> ErrorPanel:
         """Positions by ranges against the bound of the links."""
-        found = position_errors(run.scenario, run.data, train)
-        bounded = np.isfinite(found.bound_m2) & found.usable
+        errors = position_errors(run.scenario, run.data, train)
+        bounded = np.isfinite(errors.bound_m2) & errors.usable
         return ErrorPanel(
             "by ranges,\ntold by wayside",
-            found.path_m,
-            np.where(found.usable, found.error_m, np.nan),
+            errors.path_m,
+            np.where(errors.usable, errors.error_m, np.nan),
             "Cramér-Rao bound",
-            np.sqrt(np.where(bounded, found.bound_m2, np.nan)),
+            np.sqrt(np.where(bounded, errors.bound_m2, np.nan)),
         )
 
 

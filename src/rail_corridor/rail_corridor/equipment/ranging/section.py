@@ -12,13 +12,20 @@ from rail_corridor.scenario.model import Section
 from rail_corridor.scenario.section_fields import (
     ChannelNumber,
     ChannelPair,
-    Whole,
+    StrictInt,
 )
 from rail_msgs_py.ranging import quantities
 from rail_msgs_py.ranging.quantities import carrier_hz
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.ranging.signal import RangingSignal
-from rail_world.line.description_base import Chainage, Description, Name, Number, field_of, range_of
+from rail_world.line.description_base import (
+    Chainage,
+    Description,
+    Name,
+    StrictFloat,
+    field_of,
+    range_of,
+)
 
 LONGEST_ZONE_M: Final = 2000.0
 SHORTEST_ZONE_M: Final = 20.0
@@ -58,8 +65,8 @@ class StationPosition(Description):
 class StationPlan(Description):
     """Where the wayside ranging stations (WRS) stand, by rule or one by one."""
 
-    zone_length_m: Annotated[Number, Field(ge=SHORTEST_ZONE_M, le=LONGEST_ZONE_M)] | None = Field(
-        default=None, description="automatic placing: no zone is longer than this [m]"
+    zone_length_m: Annotated[StrictFloat, Field(ge=SHORTEST_ZONE_M, le=LONGEST_ZONE_M)] | None = (
+        Field(default=None, description="automatic placing: no zone is longer than this [m]")
     )
     positions: tuple[StationPosition, ...] | None = Field(
         default=None,
@@ -67,13 +74,13 @@ class StationPlan(Description):
         max_length=1000,
         description="instead of zone_length_m: every station",
     )
-    mast_offset_m: Number = Field(
+    mast_offset_m: StrictFloat = Field(
         default=3.0, ge=0.5, le=20.0, description="mast to the right of the track [m]"
     )
-    mast_height_m: Number = Field(
+    mast_height_m: StrictFloat = Field(
         default=5.0, ge=0.0, le=50.0, description="station antenna above the train antenna [m]"
     )
-    fouling_distance_m: Number = Field(
+    fouling_distance_m: StrictFloat = Field(
         default=4.5,
         ge=2.0,
         le=20.0,
@@ -97,8 +104,8 @@ class ChannelPlan(Description):
         max_length=20,
         description="pairs in turn along a branch",
     )
-    first_carrier_hz: Number = field_of(quantities.FIRST_CARRIER)
-    spacing_hz: Number = field_of(quantities.CARRIER_SPACING)
+    first_carrier_hz: StrictFloat = field_of(quantities.FIRST_CARRIER)
+    spacing_hz: StrictFloat = field_of(quantities.CARRIER_SPACING)
 
     @model_validator(mode="after")
     def _each_once(self) -> ChannelPlan:
@@ -125,16 +132,16 @@ class ChannelPlan(Description):
 class RangingPlan(Description):
     """The ranging signal and how its phase is compared."""
 
-    tone_hz: Number = field_of(quantities.TONE)
-    deviation_hz: Number = field_of(quantities.DEVIATION)
-    low_tone_hz: Annotated[Number, range_of(quantities.TONE)] | None = Field(
+    tone_hz: StrictFloat = field_of(quantities.TONE)
+    deviation_hz: StrictFloat = field_of(quantities.DEVIATION)
+    low_tone_hz: Annotated[StrictFloat, range_of(quantities.TONE)] | None = Field(
         default=None, description="two_tone: tone that resolves the cycle of the other [Hz]"
     )
-    low_deviation_hz: Annotated[Number, range_of(quantities.DEVIATION)] | None = Field(
+    low_deviation_hz: Annotated[StrictFloat, range_of(quantities.DEVIATION)] | None = Field(
         default=None, description="two_tone: its peak FM deviation [Hz]; null = low_tone_hz"
     )
-    sample_rate_hz: Number = field_of(quantities.SAMPLE_RATE)
-    samples: Whole = field_of(quantities.SAMPLES)
+    sample_rate_hz: StrictFloat = field_of(quantities.SAMPLE_RATE)
+    samples: StrictInt = field_of(quantities.SAMPLES)
     comparator: quantities.Comparator = field_of(quantities.COMPARATOR)
 
     @model_validator(mode="after")
@@ -176,36 +183,36 @@ class RangingPlan(Description):
 class RadioPlan(Description):
     """Powers, antennas, noise and propagation."""
 
-    wrs_power_dbm: Number = field_of(quantities.WRS_POWER)
-    vrs_power_dbm: Number = field_of(quantities.VRS_POWER)
-    noise_figure_db: Number = field_of(quantities.NOISE_FIGURE)
-    path_loss_exponent: Number = field_of(quantities.PATH_LOSS_EXPONENT)
-    reach_zones: Number = Field(
+    wrs_power_dbm: StrictFloat = field_of(quantities.WRS_POWER)
+    vrs_power_dbm: StrictFloat = field_of(quantities.VRS_POWER)
+    noise_figure_db: StrictFloat = field_of(quantities.NOISE_FIGURE)
+    path_loss_exponent: StrictFloat = field_of(quantities.PATH_LOSS_EXPONENT)
+    reach_zones: StrictFloat = Field(
         default=2.0,
         ge=1.0,
         le=10.0,
-        description="nothing is heard beyond this many zone lengths (Jeong et al., 2.5: two)",
+        description="nothing is received beyond this many zone lengths (Jeong et al., 2.5: two)",
     )
-    wrs_gain_dbi: Number = field_of(quantities.WRS_GAIN)
-    wrs_beamwidth_deg: Number = field_of(quantities.WRS_BEAMWIDTH)
-    vrs_gain_dbi: Number = field_of(quantities.VRS_GAIN)
-    vrs_beamwidth_deg: Number = field_of(quantities.VRS_BEAMWIDTH)
-    front_to_back_db: Number = field_of(quantities.FRONT_TO_BACK)
-    oscillator_ppm: Number = field_of(quantities.OSCILLATOR)
+    wrs_gain_dbi: StrictFloat = field_of(quantities.WRS_GAIN)
+    wrs_beamwidth_deg: StrictFloat = field_of(quantities.WRS_BEAMWIDTH)
+    vrs_gain_dbi: StrictFloat = field_of(quantities.VRS_GAIN)
+    vrs_beamwidth_deg: StrictFloat = field_of(quantities.VRS_BEAMWIDTH)
+    front_to_back_db: StrictFloat = field_of(quantities.FRONT_TO_BACK)
+    oscillator_ppm: StrictFloat = field_of(quantities.OSCILLATOR)
 
 
 class TransponderPlan(Description):
-    """The delay of the transponders on board, and how well the bench knows it."""
+    """The delay of the transponders on board, and how well the calibration rig knows it."""
 
-    delay_s: Number = field_of(quantities.TRANSPONDER_DELAY)
-    spread_s: Number = Field(
+    delay_s: StrictFloat = field_of(quantities.TRANSPONDER_DELAY)
+    spread_s: StrictFloat = Field(
         default=5e-9,
         ge=0.0,
         le=1e-6,
         description="standard deviation of the delay from one unit to the next [s]",
     )
-    bench_bursts: Whole = Field(
-        default=400, ge=1, le=100_000, description="bursts of the calibration on the bench"
+    calibration_bursts: StrictInt = Field(
+        default=400, ge=1, le=100_000, description="bursts on the calibration rig"
     )
 
 
@@ -221,7 +228,7 @@ class Jam(TimedFault):
 
     kind: Literal["jam"]
     channel: ChannelNumber = Field(description="channel it jams")
-    power_dbm: Number = field_of(quantities.JAMMER_POWER)
+    power_dbm: StrictFloat = field_of(quantities.JAMMER_POWER)
     track: Name = Field(description="track it stands at")
     at_m: Chainage = Field(description="chainage it stands at [m]")
 

@@ -15,7 +15,7 @@ from rail_corridor.equipment.run_figures import RunFigures
 from rail_corridor.equipment.subsystem import PlanContext, SectionOption, Subsystem
 from rail_corridor.run_data import RecordSpec, RunData, in_one_message, per_train
 from rail_corridor.scenario.model import Scenario
-from rail_msgs_py.position import figures_from_cdr as position_from_cdr
+from rail_msgs_py.position import position_from_cdr
 from rail_msgs_py.topics import ranging as topics
 from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
 from rail_msgs_py.topics.world import STATE
@@ -33,7 +33,7 @@ from .summary import summary
 from .world import drawing_of, radio_of
 
 
-class Ranging(Subsystem):
+class RangingSubsystem(Subsystem):
     """Wayside stations that range trains by the phase of a tone, and who tracks them by it."""
 
     name = "ranging"
@@ -129,10 +129,10 @@ class Ranging(Subsystem):
 
     def train_report(self, scenario: Scenario, data: RunData, train: int) -> dict[str, Any]:
         """See `Subsystem.train_report`."""
-        found = train_metrics(scenario, data, train)
+        errors = train_metrics(scenario, data, train)
         unit = transponders_of(scenario)[data.trains[train]]
-        found["phase_ranging"]["calibration_residual_m"] = unit.residual_m
-        return found
+        errors["phase_ranging"]["calibration_residual_m"] = unit.residual_m
+        return errors
 
     def tables(self, report: Mapping[str, Any]) -> Iterable[RenderableType]:
         """See `Subsystem.tables`."""
@@ -157,4 +157,4 @@ class Ranging(Subsystem):
         return position_markers(scene)
 
 
-RANGING: Final = Ranging()
+RANGING: Final = RangingSubsystem()

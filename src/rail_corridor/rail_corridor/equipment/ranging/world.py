@@ -10,7 +10,12 @@ import numpy as np
 
 from rail_corridor.scenario.model import Scenario
 from rail_world.line.drawing import Drawing, Mast, Stretch
-from rail_world.ranging.description import AntennaPattern, Fault, RadioDescription, StationAntenna
+from rail_world.ranging.description import (
+    AntennaPattern,
+    RadioDescription,
+    RadioFault,
+    StationAntenna,
+)
 
 from .layout import Layout, Zone, layout_of
 from .section import CHANNELS, RADIO, SIGNAL, DeadStation, Jam
@@ -60,7 +65,7 @@ def radio_of(scenario: Scenario) -> RadioDescription:
                     boresight=_squinted(zone, others),
                     downlink_channel=zone.downlink_channel,
                     uplink_channel=zone.uplink_channel,
-                    reach_m=reach_m(scenario, layout, zone),
+                    coverage_range_m=coverage_range_m(scenario, layout, zone),
                 )
             )
     pattern = {
@@ -108,7 +113,7 @@ def drawing_of(scenario: Scenario) -> Drawing:
     )
 
 
-def reach_m(scenario: Scenario, layout: Layout, zone: Zone) -> float:
+def coverage_range_m(scenario: Scenario, layout: Layout, zone: Zone) -> float:
     """Distance past which the station of a zone neither hears nor is heard.
 
     Two zones (Jeong et al., section 2.5): the straight line to the end of the next zone, the
@@ -137,14 +142,14 @@ def _squinted(zone: Zone, others: Sequence[Zone]) -> tuple[float, float, float]:
     return (cos * x - sin * y, sin * x + cos * y, z)
 
 
-def _fault(scenario: Scenario, fault: Any) -> Fault:
+def _fault(scenario: Scenario, fault: Any) -> RadioFault:
     if isinstance(fault, DeadStation):
-        return Fault(
+        return RadioFault(
             kind="dead_station", station=fault.station, from_s=fault.from_s, to_s=fault.to_s
         )
     pose = scenario.network.tracks[fault.track].pose(fault.at_m)
     # Beside the track, at the height of a mast.
-    return Fault(
+    return RadioFault(
         kind="jam",
         channel=fault.channel,
         power_dbm=fault.power_dbm,

@@ -117,7 +117,7 @@ def _circuit_row(state: LiveState, circuit: str) -> tuple[tuple[str, str], ...]:
     occupied = _occupied(state, circuit)
     return (
         (circuit, ""),
-        ("not heard of" if occupied is None else "occupied" if occupied else "clear", ""),
+        ("not received" if occupied is None else "occupied" if occupied else "clear", ""),
         (f"{level_db:.1f}".replace("-", "−") if math.isfinite(level_db) else "–", ""),
         *(fields or [("no code sent", "")]),
     )

@@ -69,12 +69,12 @@ def circuits_ahead(scenario: Scenario, plan: TrackCircuitPlan, circuit: Circuit)
     """Circuits that matter to the code of one: as far as the fastest train needs to stop, twice."""
     fastest_mps = max(c.limit_mps for c in circuits_of(scenario))
     enough_m = fastest_mps**2 / plan.braking_mps2
-    ahead, reach_m = [], 0.0
+    ahead, covered_m = [], 0.0
     for other in circuits_of(scenario):
         if other.track != circuit.track or other.start_m < circuit.end_m - 1e-6:
             continue
         ahead.append(other)
-        reach_m += other.length_m
-        if reach_m > enough_m and len(ahead) >= 3:
+        covered_m += other.length_m
+        if covered_m > enough_m and len(ahead) >= 3:
             break
     return ahead

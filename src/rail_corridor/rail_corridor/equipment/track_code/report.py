@@ -43,7 +43,7 @@ def code_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str
 
 def circuit_of(scenario: Scenario, recording: RunData, state: FloatArray) -> NDArray[np.intp]:
     """Index of the circuit that the front of a train is in, at each tick."""
-    found = np.zeros(len(state), dtype=np.intp)
+    sensed = np.zeros(len(state), dtype=np.intp)
     for track, name in enumerate(recording.tracks):
         numbers = [i for i, circuit in enumerate(circuits_of(scenario)) if circuit.track == name]
         starts_m = [circuits_of(scenario)[i].start_m for i in numbers]
@@ -51,8 +51,8 @@ def circuit_of(scenario: Scenario, recording: RunData, state: FloatArray) -> NDA
         places = (
             np.searchsorted(starts_m, state[there, STATE.index["chainage_m"]], side="right") - 1
         )
-        found[there] = np.array(numbers)[np.clip(places, 0, len(numbers) - 1)]
-    return found
+        sensed[there] = np.array(numbers)[np.clip(places, 0, len(numbers) - 1)]
+    return sensed
 
 
 def _codes(

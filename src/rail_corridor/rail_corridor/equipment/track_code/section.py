@@ -8,11 +8,11 @@ from pydantic import Field, model_validator
 
 from rail_corridor.scenario.faults import TimedFault
 from rail_corridor.scenario.model import Section
-from rail_corridor.scenario.section_fields import Whole
+from rail_corridor.scenario.section_fields import StrictInt
 from rail_msgs_py.quantities import CAB_SIGNALS, ODOMETER_ERROR
 from rail_msgs_py.track_code import quantities
 from rail_signals.track_code.profile import load_profile
-from rail_world.line.description_base import Description, Name, Number, field_of, range_of
+from rail_world.line.description_base import Description, Name, StrictFloat, field_of, range_of
 
 
 class TrackCircuitPlan(Description):
@@ -21,28 +21,28 @@ class TrackCircuitPlan(Description):
     With this section trains run on what they understand from the rails.
     """
 
-    length_m: Number = field_of(quantities.LENGTH)
-    carriers_hz: tuple[Annotated[Number, range_of(quantities.CARRIERS)], ...] = field_of(
+    length_m: StrictFloat = field_of(quantities.LENGTH)
+    carriers_hz: tuple[Annotated[StrictFloat, range_of(quantities.CARRIERS)], ...] = field_of(
         quantities.CARRIERS, min_length=2, max_length=4
     )
-    sample_rate_hz: Number = field_of(quantities.SAMPLE_RATE)
-    braking_mps2: Number = field_of(quantities.BRAKING)
+    sample_rate_hz: StrictFloat = field_of(quantities.SAMPLE_RATE)
+    braking_mps2: StrictFloat = field_of(quantities.BRAKING)
     cab_signals: bool = field_of(CAB_SIGNALS)
-    attenuation_db_per_km: Number = field_of(quantities.ATTENUATION)
-    snr_db: Number = Field(
+    attenuation_db_per_km: StrictFloat = field_of(quantities.ATTENUATION)
+    snr_db: StrictFloat = Field(
         default=40.0,
         ge=-20.0,
         le=100.0,
         description="level at the transmitter over white noise in 300 Hz [dB]",
     )
-    joint_db: Number = field_of(quantities.JOINT_LOSS)
-    harmonics: tuple[tuple[Whole, Number], ...] = Field(
+    joint_db: StrictFloat = field_of(quantities.JOINT_LOSS)
+    harmonics: tuple[tuple[StrictInt, StrictFloat], ...] = Field(
         default=((31, -30.0), (33, -33.0), (35, -34.0), (37, -36.0), (47, -40.0)),
         max_length=100,
         description="traction current: [harmonic of 50 Hz, level against the transmitter in dB]",
     )
-    impulses_per_s: Number = field_of(quantities.IMPULSE_RATE)
-    odometer_error: Number = field_of(ODOMETER_ERROR)
+    impulses_per_s: StrictFloat = field_of(quantities.IMPULSE_RATE)
+    odometer_error: StrictFloat = field_of(ODOMETER_ERROR)
 
     @model_validator(mode="after")
     def _makes_a_signal(self) -> TrackCircuitPlan:
@@ -67,7 +67,7 @@ class Sanding(TimedFault):
 
     kind: Literal["sanding"]
     train: Name = Field(description="the train that sands")
-    loss_db: Number = field_of(quantities.SANDING_LOSS)
+    loss_db: StrictFloat = field_of(quantities.SANDING_LOSS)
 
 
 class DeadTransmitter(TimedFault):

@@ -27,7 +27,7 @@ from .world import rails_of
 _SUPERVISION: Final = "code_supervision"
 
 
-class TrackCode(Subsystem):
+class TrackCodeSubsystem(Subsystem):
     """FM codes in the rails, which trains decode and obey."""
 
     name = "track_code"
@@ -147,4 +147,4 @@ class TrackCode(Subsystem):
         return TrackCodeView()
 
 
-TRACK_CODE: Final = TrackCode()
+TRACK_CODE: Final = TrackCodeSubsystem()

@@ -43,7 +43,7 @@ def most_traces(plan: BusPlan) -> int:
     consist = bus_consist(plan)
     rise_s = plan.reflectometer_rise_s
     instrument = Reflectometer(rise_time_s=rise_s, sample_period_s=rise_s / 4.0)
-    samples = instrument.samples_for(consist.line().delay_s)
+    samples = instrument.samples_for(consist.bus_line().delay_s)
     return _LARGEST_BLOCK // (_BYTES_PER_SAMPLE * samples)
 
 
@@ -61,9 +61,11 @@ def _terminal(scenario: Scenario, plan: BusPlan, end: str, timeout_s: float) -> 
     }
 
 
-def _monitor(scenario: Scenario, plan: BusPlan, share: float, timeout_s: float) -> dict[str, Any]:
+def _monitor(
+    scenario: Scenario, plan: BusPlan, fraction: float, timeout_s: float
+) -> dict[str, Any]:
     # Trains measure one after the other, not all in one tick.
-    ticks = math.floor(share * plan.period_s / scenario.tick_s)
+    ticks = math.floor(fraction * plan.period_s / scenario.tick_s)
     return {
         "cars": plan.cars,
         "period_s": plan.period_s,

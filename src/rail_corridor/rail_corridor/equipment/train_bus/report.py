@@ -87,16 +87,16 @@ def _not_confirmed_s(head: FloatArray, tick_s: float) -> float:
 
 def _reports(scenario: Scenario, fault: BusFault | None, state: FloatArray) -> list[dict[str, Any]]:
     """Each time the monitor changed its mind on kind or level, towards a fault."""
-    said = state[:, [BUS_STATE.index["kind"], BUS_STATE.index["level"]]]
-    said = np.where(np.isnan(said), 0.0, said)
-    before = np.concatenate((np.zeros((1, 2)), said[:-1]))
-    changed: NDArray[np.bool_] = (said != before).any(axis=1) & (said[:, 0] > 0.0)
+    reported = state[:, [BUS_STATE.index["kind"], BUS_STATE.index["level"]]]
+    reported = np.where(np.isnan(reported), 0.0, reported)
+    before = np.concatenate((np.zeros((1, 2)), reported[:-1]))
+    changed: NDArray[np.bool_] = (reported != before).any(axis=1) & (reported[:, 0] > 0.0)
     place_m = None if fault is None else place_of_fault(scenario, fault)
-    found = []
+    reports = []
     for tick in np.flatnonzero(changed):
         row = state[tick]
         error_m = None if place_m is None else float(row[BUS_STATE.index["place_m"]] - place_m)
-        found.append(
+        reports.append(
             {
                 "time_s": float(tick) * scenario.tick_s,
                 "kind": KINDS[int(row[BUS_STATE.index["kind"]]) - 1],
@@ -106,7 +106,7 @@ def _reports(scenario: Scenario, fault: BusFault | None, state: FloatArray) -> l
                 "size": _number(row[BUS_STATE.index["size"]]),
             }
         )
-    return found
+    return reports
 
 
 def _number(value: float) -> float | None:

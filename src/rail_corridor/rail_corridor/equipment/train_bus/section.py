@@ -8,12 +8,12 @@ from pydantic import Field, model_validator
 
 from rail_corridor.scenario.faults import Fault
 from rail_corridor.scenario.model import Section
-from rail_corridor.scenario.section_fields import Whole
+from rail_corridor.scenario.section_fields import StrictInt
 from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END
 from rail_msgs_py.quantity import NEEDED
 from rail_msgs_py.train_bus import quantities
 from rail_signals.train_bus.frame import BusFrameFormat
-from rail_world.line.description_base import Description, Name, Number, field_of, range_of
+from rail_world.line.description_base import Description, Name, StrictFloat, field_of, range_of
 from rail_world.train_bus.description import FaultKind
 
 #: Size of each kind where none is given; open and wrong_cable have none.
@@ -43,16 +43,16 @@ class BusPlan(Description):
     trains: tuple[Name, ...] = Field(
         default=(), max_length=100, description="trains that have the bus; empty = all"
     )
-    bit_rate_hz: Number = field_of(quantities.BIT_RATE)
-    samples_per_bit: Whole = field_of(quantities.SAMPLES_PER_BIT)
-    rise_time_s: Number = field_of(quantities.RISE_TIME)
-    level_v: Number = field_of(quantities.LEVEL)
-    noise_v: Number = field_of(quantities.NOISE)
-    answer_timeout_s: Number = field_of(quantities.ANSWER_TIMEOUT)
-    period_s: Number = field_of(quantities.PERIOD)
-    traces: Whole = field_of(quantities.TRACES)
-    reflectometer_rise_s: Number = field_of(quantities.REFLECTOMETER_RISE)
-    reflectometer_noise: Number = field_of(quantities.REFLECTOMETER_NOISE)
+    bit_rate_hz: StrictFloat = field_of(quantities.BIT_RATE)
+    samples_per_bit: StrictInt = field_of(quantities.SAMPLES_PER_BIT)
+    rise_time_s: StrictFloat = field_of(quantities.RISE_TIME)
+    level_v: StrictFloat = field_of(quantities.LEVEL)
+    noise_v: StrictFloat = field_of(quantities.NOISE)
+    answer_timeout_s: StrictFloat = field_of(quantities.ANSWER_TIMEOUT)
+    period_s: StrictFloat = field_of(quantities.PERIOD)
+    traces: StrictInt = field_of(quantities.TRACES)
+    reflectometer_rise_s: StrictFloat = field_of(quantities.REFLECTOMETER_RISE)
+    reflectometer_noise: StrictFloat = field_of(quantities.REFLECTOMETER_NOISE)
 
     @model_validator(mode="after")
     def _makes_frames(self) -> BusPlan:
@@ -75,28 +75,28 @@ class BusFault(Fault):
     kind: Literal["bus_fault"]
     train: Name = Field(description="the train")
     fault: FaultKind = Field(description="what it is; open and wrong_cable do not grow")
-    from_s: Number = field_of(FAULT_BEGIN)
-    to_s: Number = field_of(FAULT_END.but(default=NEEDED, text="it is as large as it gets"))
+    from_s: StrictFloat = field_of(FAULT_BEGIN)
+    to_s: StrictFloat = field_of(FAULT_END.but(default=NEEDED, text="it is as large as it gets"))
     law: Literal["linear", "exponential"] = Field(default="exponential", description="of growth")
-    size: Annotated[Number, range_of(quantities.FAULT_SIZE)] | None = Field(
+    size: Annotated[StrictFloat, range_of(quantities.FAULT_SIZE)] | None = Field(
         default=None,
         description="when it has grown: resistance of loose_connector and bad_splice, and what is"
         " left of it in a short [ohm]; rise of the capacitance (water_ingress), of impedance and"
         " loss (missing_shield_ground) as a share; null = 3000, 3000, 1, 0.6, 0.2",
     )
-    at_m: Annotated[Number, range_of(quantities.FAULT_PLACE)] | None = Field(
+    at_m: Annotated[StrictFloat, range_of(quantities.FAULT_PLACE)] | None = Field(
         default=None, description=quantities.FAULT_PLACE.description
     )
-    car: Annotated[Whole, range_of(quantities.FAULT_CAR)] | None = Field(
+    car: Annotated[StrictInt, range_of(quantities.FAULT_CAR)] | None = Field(
         default=None, description=quantities.FAULT_CAR.description
     )
-    coupler: Annotated[Whole, range_of(quantities.FAULT_COUPLER)] | None = Field(
+    coupler: Annotated[StrictInt, range_of(quantities.FAULT_COUPLER)] | None = Field(
         default=None, description=quantities.FAULT_COUPLER.description
     )
-    length_m: Number = field_of(quantities.WET_LENGTH)
-    conductance_us_per_m: Number = field_of(quantities.WET_CONDUCTANCE)
-    spread: Number = field_of(quantities.CONTACT_SPREAD)
-    noise_factor: Number = field_of(quantities.NOISE_FACTOR)
+    length_m: StrictFloat = field_of(quantities.WET_LENGTH)
+    conductance_us_per_m: StrictFloat = field_of(quantities.WET_CONDUCTANCE)
+    spread: StrictFloat = field_of(quantities.CONTACT_SPREAD)
+    noise_factor: StrictFloat = field_of(quantities.NOISE_FACTOR)
     cable: str = Field(
         default="polyethylene", max_length=40, description="wrong_cable: profile of what is there"
     )

@@ -25,7 +25,7 @@ from .world import bus_description, bus_trains
 _ONBOARD: Final = "rail_onboard.train_bus"
 
 
-class TrainBus(Subsystem):
+class TrainBusSubsystem(Subsystem):
     """The bus in the trains, and the reflectometer that watches its cable."""
 
     name = "train_bus"
@@ -95,4 +95,4 @@ class TrainBus(Subsystem):
         return TrainBusView()
 
 
-TRAIN_BUS: Final = TrainBus()
+TRAIN_BUS: Final = TrainBusSubsystem()

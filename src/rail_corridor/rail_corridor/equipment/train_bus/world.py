@@ -12,7 +12,7 @@ from rail_world.train_bus.description import BusDescription, BusFaultDescription
 from .section import TRAIN_BUS_SECTION, BusFault, BusPlan
 
 #: Beyond the delay as drawn: tolerances, and what dispersion adds.
-_DELAY_SHARE: Final = 1.2
+_DELAY_FRACTION: Final = 1.2
 _DELAY_MARGIN_S: Final = 2e-6
 
 
@@ -73,7 +73,7 @@ def bus_description(scenario: Scenario) -> BusDescription | None:
 
 def longest_delay_s(consist: Consist) -> float:
     """Longest delay of a frame that receivers look for [s]."""
-    return _DELAY_SHARE * consist.line().delay_s + _DELAY_MARGIN_S
+    return _DELAY_FRACTION * consist.bus_line().delay_s + _DELAY_MARGIN_S
 
 
 def _fault(fault: BusFault | None) -> BusFaultDescription | None:

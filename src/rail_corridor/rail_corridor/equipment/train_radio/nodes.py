@@ -67,7 +67,7 @@ def burst_format(plan: CbtcPlan) -> RadioBurstFormat:
     )
 
 
-def secret(scenario: Scenario) -> str:
+def authentication_key(scenario: Scenario) -> str:
     """Secret of the safe channels, as hexadecimal digits; of the seed, as every draw is."""
     return hashlib.sha256(f"safe channels of seed {scenario.seed}".encode()).hexdigest()
 
@@ -121,7 +121,7 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
         "traction_mps2": Vehicle(train.vehicle).traction_mps2(0.0),
         "odometer_error": CLAIM_SIGMAS.default * plan.odometer_error,
         "authority_timeout_s": plan.timeout_s,
-        "secret": secret(scenario),
+        "secret": authentication_key(scenario),
         "seed": scenario.seed,
         "tick_s": scenario.tick_s,
         "timeout_s": 3 * timeout_s / 5,
@@ -163,7 +163,7 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
         ),
         "margin_m": plan.margin_m,
         "validity_s": plan.timeout_s,
-        "secret": secret(scenario),
+        "secret": authentication_key(scenario),
         "seed": scenario.seed,
         "tick_s": scenario.tick_s,
     }

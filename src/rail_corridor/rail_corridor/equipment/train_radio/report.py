@@ -34,7 +34,7 @@ def cbtc_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str
     mine = recording[STATE].upto(ticks)[:, index]
     on_line = mine[:, STATE.index["on_line"]] > 0.0
     atp = recording[ATP_STATE].upto(ticks)[:, index]
-    given = recording[AUTHORITY].upto(ticks)[:, index]
+    issued = recording[AUTHORITY].upto(ticks)[:, index]
     radio = recording[RADIO_LINK].upto(ticks)[:, index]
     links = recording[CBTC_LINKS].upto(ticks)[:, index]
     front_m = mine[:, STATE.index["chainage_m"]]
@@ -44,7 +44,7 @@ def cbtc_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str
     speed_mps = np.abs(mine[:, STATE.index["speed_mps"]])
     passed, withdrawn = _passed(scenario, index, on_line, front_m, speed_mps, end_m)
     return {
-        "cbtc": _link(scenario, on_line, atp, given, radio, links)
+        "cbtc": _link(scenario, on_line, atp, issued, radio, links)
         | report_metrics(scenario, recording, index)
         | _location(on_line, front_m, atp)
         | {"passed_s": _passed_s(scenario, index, mine, on_line)},
@@ -77,15 +77,15 @@ def _passed(
     stands_by_m = -math.inf
     for tick in np.flatnonzero(on_line).tolist():
         v = speed_mps[tick]
-        way_m = v * delay_s + 0.5 * v * v / plan.emergency_mps2
+        stopping_m = v * delay_s + 0.5 * v * v / plan.emergency_mps2
         appears = tick == 0 or not on_line[tick - 1]
         cut = none[tick] if appears else end_m[tick] < end_m[tick - 1] - 1.0
-        if cut and end_m[tick] < front_m[tick] + way_m:
+        if cut and end_m[tick] < front_m[tick] + stopping_m:
             if not excused:
                 withdrawn += not none[tick]
                 stands_by_m = front_m[tick] + _braking_way_m(scenario, index, v)
             excused = True
-        elif v == 0.0 or front_m[tick] <= end_m[tick] - way_m:
+        elif v == 0.0 or front_m[tick] <= end_m[tick] - stopping_m:
             excused = False
         braking = excused and front_m[tick] <= stands_by_m
         passed += bool(v > 0.0 and front_m[tick] > end_m[tick] and not braking)
@@ -104,8 +104,8 @@ def _braking_way_m(scenario: Scenario, index: int, speed_mps: float) -> float:
     delay_s = 3.0 * scenario.tick_s
     fastest_mps = speed_mps + gathered_mps2 * delay_s
     braked_mps2 = max(plan.braking_mps2 - fall_mps2, LEAST_BRAKING_MPS2)
-    way_m = (speed_mps + 0.5 * gathered_mps2 * delay_s) * delay_s
-    return way_m + 0.5 * fastest_mps * fastest_mps / braked_mps2
+    stopping_m = (speed_mps + 0.5 * gathered_mps2 * delay_s) * delay_s
+    return stopping_m + 0.5 * fastest_mps * fastest_mps / braked_mps2
 
 
 def _held(end_m: FloatArray, accepted: FloatArray) -> FloatArray:
@@ -119,16 +119,16 @@ def _link(
     scenario: Scenario,
     on_line: NDArray[np.bool_],
     atp: FloatArray,
-    given: FloatArray,
+    issued: FloatArray,
     radio: FloatArray,
     links: FloatArray,
 ) -> dict[str, Any]:
     """Frames both ways, and how old the authority on board was."""
     age_s = atp[on_line, ATP_STATE.index["authority_age_s"]]
     age_s = age_s[np.isfinite(age_s)]
-    accepted = _last(atp, ATP_STATE.index["accepted"]) + _last(given, AUTHORITY.index["accepted"])
-    lost = _last(atp, ATP_STATE.index["lost"]) + _last(given, AUTHORITY.index["lost"])
-    rejected = _last(atp, ATP_STATE.index["rejected"]) + _last(given, AUTHORITY.index["rejected"])
+    accepted = _last(atp, ATP_STATE.index["accepted"]) + _last(issued, AUTHORITY.index["accepted"])
+    lost = _last(atp, ATP_STATE.index["lost"]) + _last(issued, AUTHORITY.index["lost"])
+    rejected = _last(atp, ATP_STATE.index["rejected"]) + _last(issued, AUTHORITY.index["rejected"])
     channel = radio[:, RADIO_LINK.index["channel"]]
     changes = (channel[1:] != channel[:-1]) & (channel[:-1] > 0)
     snr = links[on_line, CBTC_LINKS.index["snr_down"]]
@@ -139,7 +139,7 @@ def _link(
         "frames": int(accepted + lost),
         "lost": int(lost),
         "rejected": int(rejected),
-        "forged_accepted": forged_authorities(scenario.tick_s, atp, given),
+        "forged_accepted": forged_authorities(scenario.tick_s, atp, issued),
         "age_median_s": float(np.median(age_s)) if age_s.size else None,
         "age_p95_s": float(np.quantile(age_s, 0.95)) if age_s.size else None,
         "without_authority_s": float(lost_s * scenario.tick_s),

@@ -8,11 +8,11 @@ from pydantic import Field, model_validator
 
 from rail_corridor.scenario.faults import TimedFault
 from rail_corridor.scenario.model import Section
-from rail_corridor.scenario.section_fields import Whole
+from rail_corridor.scenario.section_fields import StrictInt
 from rail_msgs_py.quantities import CAB_SIGNALS, ODOMETER_ERROR
 from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.quantities import carrier_hz
-from rail_world.line.description_base import Chainage, Description, Name, Number, field_of
+from rail_world.line.description_base import Chainage, Description, Name, StrictFloat, field_of
 from rail_world.train_radio.threat_description import Threats
 
 
@@ -21,10 +21,10 @@ class LossPlan(Description):
 
     kind: Literal["cutting", "tunnel"] = Field(description="what it is")
     track: Name = Field(description="track it lies on")
-    from_m: Chainage = Field(description="begin [m]")
+    from_m: Chainage = Field(description="start [m]")
     to_m: Chainage = Field(description="end [m]")
-    entry_db: Number = field_of(quantities.ENTRY_LOSS)
-    db_per_km: Number = field_of(quantities.TUNNEL_LOSS)
+    entry_db: StrictFloat = field_of(quantities.ENTRY_LOSS)
+    db_per_km: StrictFloat = field_of(quantities.TUNNEL_LOSS)
 
     @model_validator(mode="after")
     def _has_a_length(self) -> LossPlan:
@@ -41,37 +41,39 @@ class CbtcPlan(Description):
     With this section trains run on the movement authorities that they receive.
     """
 
-    base_spacing_m: Number = Field(
+    base_spacing_m: StrictFloat = Field(
         default=1200.0, ge=50.0, le=20_000.0, description="no base station is farther apart [m]"
     )
     scheme: quantities.Scheme = field_of(quantities.SCHEME)
     constellation: quantities.Constellation = field_of(quantities.CONSTELLATION)
-    symbol_rate_hz: Number = field_of(quantities.SYMBOL_RATE)
-    samples_per_symbol: Whole = field_of(quantities.SAMPLES_PER_SYMBOL)
-    pilot_period: Whole = field_of(quantities.PILOT_PERIOD)
-    channels: Whole = field_of(quantities.CHANNELS)
-    carrier_hz: Number = field_of(quantities.CARRIER)
-    spacing_hz: Number = field_of(quantities.CARRIER_SPACING)
-    duplex_hz: Number = field_of(quantities.DUPLEX_SPACING)
-    base_power_dbm: Number = field_of(quantities.BASE_POWER)
-    train_power_dbm: Number = field_of(quantities.TRAIN_POWER)
-    extra_loss_db: Number = field_of(quantities.EXTRA_LOSS)
-    path_loss_exponent: Number = field_of(quantities.PATH_LOSS_EXPONENT)
-    noise_figure_db: Number = field_of(quantities.NOISE_FIGURE)
-    rician_factor: Number = field_of(quantities.RICIAN_FACTOR)
-    mast_offset_m: Number = Field(default=6.0, ge=0.5, le=100.0, description="off the track [m]")
-    mast_height_m: Number = Field(
+    symbol_rate_hz: StrictFloat = field_of(quantities.SYMBOL_RATE)
+    samples_per_symbol: StrictInt = field_of(quantities.SAMPLES_PER_SYMBOL)
+    pilot_period: StrictInt = field_of(quantities.PILOT_PERIOD)
+    channels: StrictInt = field_of(quantities.CHANNELS)
+    carrier_hz: StrictFloat = field_of(quantities.CARRIER)
+    spacing_hz: StrictFloat = field_of(quantities.CARRIER_SPACING)
+    duplex_hz: StrictFloat = field_of(quantities.DUPLEX_SPACING)
+    base_power_dbm: StrictFloat = field_of(quantities.BASE_POWER)
+    train_power_dbm: StrictFloat = field_of(quantities.TRAIN_POWER)
+    extra_loss_db: StrictFloat = field_of(quantities.EXTRA_LOSS)
+    path_loss_exponent: StrictFloat = field_of(quantities.PATH_LOSS_EXPONENT)
+    noise_figure_db: StrictFloat = field_of(quantities.NOISE_FIGURE)
+    rician_factor: StrictFloat = field_of(quantities.RICIAN_FACTOR)
+    mast_offset_m: StrictFloat = Field(
+        default=6.0, ge=0.5, le=100.0, description="off the track [m]"
+    )
+    mast_height_m: StrictFloat = Field(
         default=8.0, ge=0.0, le=100.0, description="base station above the train antenna [m]"
     )
     losses: tuple[LossPlan, ...] = Field(
         default=(), max_length=100, description="cuttings and tunnels"
     )
-    braking_mps2: Number = field_of(quantities.BRAKING)
-    emergency_mps2: Number = field_of(quantities.EMERGENCY_BRAKING)
-    margin_m: Number = field_of(quantities.MARGIN)
-    timeout_s: Number = field_of(quantities.AUTHORITY_TIMEOUT)
+    braking_mps2: StrictFloat = field_of(quantities.BRAKING)
+    emergency_mps2: StrictFloat = field_of(quantities.EMERGENCY_BRAKING)
+    margin_m: StrictFloat = field_of(quantities.MARGIN)
+    timeout_s: StrictFloat = field_of(quantities.AUTHORITY_TIMEOUT)
     cab_signals: bool = field_of(CAB_SIGNALS)
-    odometer_error: Number = field_of(ODOMETER_ERROR)
+    odometer_error: StrictFloat = field_of(ODOMETER_ERROR)
 
     @model_validator(mode="after")
     def _brakes_agree(self) -> CbtcPlan:
@@ -111,8 +113,8 @@ class NetworkThreats(TimedFault):
         description="some of repetition, deletion, insertion, resequencing, corruption, delay, "
         "masquerade"
     )
-    rate: Number = field_of(quantities.THREAT_RATE)
-    longest_delay_s: Number = field_of(quantities.LONGEST_DELAY)
+    rate: StrictFloat = field_of(quantities.THREAT_RATE)
+    longest_delay_s: StrictFloat = field_of(quantities.LONGEST_DELAY)
 
     @property
     def subject(self) -> str:

@@ -36,7 +36,7 @@ from .world import cbtc_description, threats_of
 _MEDIUM: Final = "rail_world.train_radio"
 
 
-class TrainRadio(Subsystem):
+class TrainRadioSubsystem(Subsystem):
     """The space-time coded radio that carries position reports and movement authorities."""
 
     name = "train_radio"
@@ -169,4 +169,4 @@ class TrainRadio(Subsystem):
         return TrainRadioFigures()
 
 
-TRAIN_RADIO: Final = TrainRadio()
+TRAIN_RADIO: Final = TrainRadioSubsystem()

@@ -13,7 +13,7 @@ from rail_msgs_py.topics.train_radio import (
     UP_TELEGRAMS,
 )
 from rail_msgs_py.train_radio.movement_authority import AUTHORITY_BYTES, MovementAuthority
-from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES, Kind, payload_of, read_header
+from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES, FrameKind, payload_of, read_header
 from rail_msgs_py.train_radio.telegrams import Telegrams
 from rail_msgs_py.train_radio.train_channel import CONTROLLER_IDENTITY
 from rail_msgs_py.train_radio.train_report import REPORT_BYTES, LocationReport
@@ -62,7 +62,7 @@ class TelegramReader:
         if len(frame) != FRAME_BYTES:
             return LogEntry(time_s, stage, place, "?", "?", "unreadable", 0, "")
         header = read_header(frame)
-        kinds = {int(kind): kind.name.lower().replace("_", " ") for kind in Kind}
+        kinds = {int(kind): kind.name.lower().replace("_", " ") for kind in FrameKind}
         payload = payload_of(frame, min(header.length, _PAYLOAD_MOST))
         try:
             text = self._contents(header.kind, payload)
@@ -80,7 +80,7 @@ class TelegramReader:
         )
 
     def _contents(self, kind: int, payload: bytes) -> str:
-        if kind == Kind.LOCATION_REPORT and len(payload) == REPORT_BYTES:
+        if kind == FrameKind.LOCATION_REPORT and len(payload) == REPORT_BYTES:
             report = LocationReport.from_bytes(payload)
             if not report.position_valid:
                 return "position not known"
@@ -89,7 +89,7 @@ class TelegramReader:
                 f"front at {report.offset_m:.1f} m on {self._track(report.segment)}"
                 f" ± {report.uncertainty_m:.1f} m, {3.6 * report.speed_mps:.0f} km/h{integrity}"
             )
-        if kind == Kind.MOVEMENT_AUTHORITY and len(payload) == AUTHORITY_BYTES:
+        if kind == FrameKind.MOVEMENT_AUTHORITY and len(payload) == AUTHORITY_BYTES:
             authority = MovementAuthority.from_bytes(payload)
             if authority.emergency_stop:
                 return "stop at once"
@@ -97,7 +97,7 @@ class TelegramReader:
                 f"up to {authority.end_of_authority_m:.1f} m on {self._track(authority.segment)},"
                 f" {3.6 * authority.limit_mps:.0f} km/h, valid {authority.validity_s:.1f} s"
             )
-        if kind == Kind.GREETING:
+        if kind == FrameKind.GREETING:
             return "offer of a session"
         return f"{len(payload)} bytes"
 

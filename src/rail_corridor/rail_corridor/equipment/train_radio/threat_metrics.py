@@ -45,10 +45,10 @@ def threat_line(report: Mapping[str, Any]) -> str | None:
     )
 
 
-def forged_authorities(tick_s: float, atp: FloatArray, given: FloatArray) -> int:
+def forged_authorities(tick_s: float, atp: FloatArray, issued: FloatArray) -> int:
     """Authorities in force on board that the zone controller has not given to this train.
 
-    ``atp`` and ``given`` are its tables [tick, column]. A genuine one has the end that was given
+    ``atp`` and ``issued`` are its tables [tick, column]. A genuine one has the end that was given
     at its time-stamp. Where that tick of the controller is not on record, as when it died, any
     end that it ever gave will do.
     """
@@ -58,17 +58,19 @@ def forged_authorities(tick_s: float, atp: FloatArray, given: FloatArray) -> int
     )
     held = np.flatnonzero(np.isfinite(end_m) & np.isfinite(age_s))
     sealed_s = np.round(held * tick_s - age_s[held], 6)
-    given_m = given[:, AUTHORITY.index["end_of_authority_m"]]
-    silent = np.isnan(given[:, AUTHORITY.index["accepted"]])
-    ever_m = given_m[np.isfinite(given_m)]
+    issued_m = issued[:, AUTHORITY.index["end_of_authority_m"]]
+    silent = np.isnan(issued[:, AUTHORITY.index["accepted"]])
+    ever_m = issued_m[np.isfinite(issued_m)]
     forged = 0
-    for time_s, told_m in sorted(set(zip(sealed_s.tolist(), end_m[held].tolist(), strict=True))):
+    for time_s, reported_m in sorted(
+        set(zip(sealed_s.tolist(), end_m[held].tolist(), strict=True))
+    ):
         then = round(time_s / tick_s)
-        if not 0 <= then < len(given_m) or abs(time_s - then * tick_s) > _SAME_S:
+        if not 0 <= then < len(issued_m) or abs(time_s - then * tick_s) > _SAME_S:
             forged += 1
             continue
-        wanted_m = ever_m if silent[then] else given_m[then : then + 1]
-        forged += not np.any(np.abs(wanted_m - told_m) <= _ROUNDING_M)
+        wanted_m = ever_m if silent[then] else issued_m[then : then + 1]
+        forged += not np.any(np.abs(wanted_m - reported_m) <= _ROUNDING_M)
     return forged
 
 
@@ -91,11 +93,11 @@ def report_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[s
         "direction": 1,
         "integrity_confirmed": 1,
     }
-    taken = forged = 0
+    accepted = forged = 0
     newest = -1
     oldest_s = max(1.0, 3.0 * scenario.tick_s) + _SAME_S
     for tick, row in recording.events(REPORTS).of(index, recording.ticks):
-        taken += 1
+        accepted += 1
         sealed_s = row[REPORTS.index["sealed_s"]]
         then = round(sealed_s / scenario.tick_s)
         timely = (
@@ -110,7 +112,7 @@ def report_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[s
         elif then < len(recorded) and recorded[then]:
             named = all(row[REPORTS.index[name]] == value for name, value in own.items())
             forged += not (named and _same_place(row, believed[then]))
-    return {"reports_taken": taken, "forged_reports": forged}
+    return {"reports_taken": accepted, "forged_reports": forged}
 
 
 def _same_place(report: FloatArray, believed: FloatArray) -> bool:
@@ -125,5 +127,5 @@ def _same_place(report: FloatArray, believed: FloatArray) -> bool:
     at, half = covering(front_m, half_m, PER_METRE, PER_METRE_COARSE)
     if half / PER_METRE_COARSE > WIDEST_M:
         return not valid
-    told = report[REPORTS.index["offset_m"]], report[REPORTS.index["uncertainty_m"]]
-    return valid and told == (at / PER_METRE, half / PER_METRE_COARSE)
+    reported = report[REPORTS.index["offset_m"]], report[REPORTS.index["uncertainty_m"]]
+    return valid and reported == (at / PER_METRE, half / PER_METRE_COARSE)

@@ -13,7 +13,7 @@ from .placement import bases_of
 from .section import CBTC, DeadBaseStation, NetworkThreats
 
 #: Base stations are heard this many of their spacings away; channels come again after more.
-_REACH_SPACINGS: Final = 1.4
+_COVERAGE_SPACINGS: Final = 1.4
 
 
 def cbtc_description(scenario: Scenario) -> CbtcDescription | None:
@@ -67,7 +67,7 @@ def cbtc_description(scenario: Scenario) -> CbtcDescription | None:
         train_power_dbm=plan.train_power_dbm,
         noise_figure_db=plan.noise_figure_db,
         path_loss_exponent=plan.path_loss_exponent,
-        reach_m=_REACH_SPACINGS * plan.base_spacing_m,
+        coverage_range_m=_COVERAGE_SPACINGS * plan.base_spacing_m,
         rician_factor=plan.rician_factor,
         snr_offset_db=-plan.extra_loss_db,
         sections=tuple(sections),

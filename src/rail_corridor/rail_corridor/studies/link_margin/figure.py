@@ -1,4 +1,4 @@
-"""The picture of the link-margin sweep: headway and spurious brakings against link SNR."""
+"""The figure of the link-margin sweep: headway and spurious brakings against link SNR."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rail_corridor.plotting import COLOURS, STYLE
 from .theory import brakings_per_hour, line_es_n0_db
 
 if TYPE_CHECKING:
-    from .points import Row
+    from .points import LinkMarginRow
 
 _LABELS = {
     "siso": ("SISO", "o"),
@@ -29,7 +29,7 @@ _LEVELS_DB = np.arange(4.0, 34.1, 0.5)
 _RATES = (1e-4, 1500.0)
 
 
-def draw_link_margin(rows: Sequence[Row], path: Path) -> None:
+def draw_link_margin(rows: Sequence[LinkMarginRow], path: Path) -> None:
     """Draw measured points and the curves of theory into a file."""
     style_of_figures: Any = STYLE
     with mpl.rc_context(style_of_figures):
@@ -65,7 +65,7 @@ def draw_link_margin(rows: Sequence[Row], path: Path) -> None:
         figure.savefig(path, metadata={"Software": None})
 
 
-def _headway(axes: Any, rows: Sequence[Row], style: dict[str, Any]) -> None:
+def _headway(axes: Any, rows: Sequence[LinkMarginRow], style: dict[str, Any]) -> None:
     """Draw mean headways; open markers where some train did not pass within the run."""
     known = [(row.es_n0_db, row.headway_s, row.unpassed) for row in rows if row.headway_s]
     axes.plot([x for x, _, _ in known], [y for _, y, _ in known], **style)
@@ -80,7 +80,7 @@ def _headway(axes: Any, rows: Sequence[Row], style: dict[str, Any]) -> None:
     )
 
 
-def _brakings(axes: Any, scheme: str, rows: Sequence[Row], style: dict[str, Any]) -> None:
+def _brakings(axes: Any, scheme: str, rows: Sequence[LinkMarginRow], style: dict[str, Any]) -> None:
     """Draw rates with their Poisson intervals, and the curve of theory."""
     from .points import TICK_S, Point, rate_interval, scenario_data
 

@@ -21,7 +21,7 @@ from scipy.stats import chi2
 
 from rail_corridor.equipment.train_radio.report import PASSED_AT
 
-from .theory import Prediction
+from .theory import LinkPrediction
 
 SCHEMES: Final = ("siso", "mrc", "alamouti_2x1", "alamouti_2x2")
 #: Loss of the stretch at each point [dB]: from hardly any lost frame to more than half of them.
@@ -38,7 +38,7 @@ CHECKPOINTS: Final = (0.4, 0.5, 0.6)
 
 _APART_M = 350.0
 _SPACING_M = 600.0
-_REACH_M = 1.4 * _SPACING_M
+_COVERAGE_RANGE_M = 1.4 * _SPACING_M
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,11 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Row:
+class LinkMarginRow:
     """What came of one point, of one run or of several that differ in their seeds.
 
     ``es_n0_db`` median in the stretch of the mean Es/N0 per receive antenna [dB];
-    ``frame_loss`` share of the frames, both ways, that were not accepted as data, all losses
+    ``frame_loss`` fraction of the frames, both ways, that were not accepted as data, all losses
     before the stretch (at its border) counted into it: an upper bound;
     ``age_p95_s`` of the authorities over the whole run, the worst train's [s]; ``headway_s`` mean
     time from one train to the next at the checkpoints, ``headway_p95_s`` the 95th percentile [s];
@@ -82,7 +82,7 @@ class Row:
     brakings: int
     train_hours: float
     passed_authority: int
-    prediction: Prediction
+    prediction: LinkPrediction
 
     @property
     def brakings_per_hour(self) -> float | None:
@@ -112,7 +112,7 @@ def scenario_data(point: Point) -> dict[str, Any]:
             "entry_db": point.loss_db,
         }
         for mast_m in masts_m
-        if mast_m + _REACH_M > STRETCH_FROM * length_m
+        if mast_m + _COVERAGE_RANGE_M > STRETCH_FROM * length_m
     ]
     return {
         "name": point.name.replace(".", "_"),
@@ -143,9 +143,11 @@ def scenario_data(point: Point) -> dict[str, Any]:
     }
 
 
-def aggregate(point: Point, reports: Sequence[Mapping[str, Any]], prediction: Prediction) -> Row:
+def aggregate(
+    point: Point, reports: Sequence[Mapping[str, Any]], prediction: LinkPrediction
+) -> LinkMarginRow:
     """Row of a point from the reports of its runs; trains are in the order in which they run."""
-    begin, *places = (PASSED_AT.index(share) for share in (STRETCH_FROM, *CHECKPOINTS))
+    start, *places = (PASSED_AT.index(fraction) for fraction in (STRETCH_FROM, *CHECKPOINTS))
     sent = accepted = unpassed = passings = brakings = passed_authority = 0
     inside_s = without_s = 0.0
     headways_s: list[float] = []
@@ -158,7 +160,7 @@ def aggregate(point: Point, reports: Sequence[Mapping[str, Any]], prediction: Pr
             without_s += train["cbtc"]["without_authority_s"]
             if train["cbtc"]["age_p95_s"] is not None:
                 ages_s.append(train["cbtc"]["age_p95_s"])
-            entered_s = train["cbtc"]["passed_s"][begin]
+            entered_s = train["cbtc"]["passed_s"][start]
             if entered_s is None:
                 continue
             inside_s += end_s - entered_s
@@ -175,9 +177,9 @@ def aggregate(point: Point, reports: Sequence[Mapping[str, Any]], prediction: Pr
                 if ahead is not None and after is not None
             ]
         passings += len(trains) * len(places)
-        brakings += _brakings(report, begin)
+        brakings += _brakings(report, start)
     headways_s.sort()
-    return Row(
+    return LinkMarginRow(
         scheme=point.scheme,
         loss_db=point.loss_db,
         es_n0_db=prediction.es_n0_db,
@@ -195,14 +197,14 @@ def aggregate(point: Point, reports: Sequence[Mapping[str, Any]], prediction: Pr
     )
 
 
-def _brakings(report: Mapping[str, Any], begin: int) -> int:
+def _brakings(report: Mapping[str, Any], start: int) -> int:
     """Losses of authority of trains that are in the stretch: each makes its train brake.
 
     The one at its border is no matter of the margin: the good mast goes out of reach at once.
     """
     count = 0
     for name, train in report["trains"].items():
-        entered_s = train["cbtc"]["passed_s"][begin]
+        entered_s = train["cbtc"]["passed_s"][start]
         source = f"/{name}/atp: supervision"
         count += entered_s is not None and sum(
             event["name"] == source

@@ -16,7 +16,7 @@ from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.run.child_run import RunFailedError, faultless_report_of
 
 from .figure import draw_link_margin
-from .points import LOSSES_DB, SCHEMES, Point, Row, aggregate, points, scenario_data
+from .points import LOSSES_DB, SCHEMES, LinkMarginRow, Point, aggregate, points, scenario_data
 from .table import print_rows, write_rows
 from .theory import predict
 
@@ -24,7 +24,9 @@ _WORKERS: Final = 2
 _RUN_TIMEOUT_S: Final = 900.0
 
 
-def run_link_margin(out_dir: Path, quick: bool, console: Console, seeds: int = 1) -> list[Row]:
+def run_link_margin(
+    out_dir: Path, quick: bool, console: Console, seeds: int = 1
+) -> list[LinkMarginRow]:
     """Run the sweep; write ``link_margin.json`` and ``link_margin.png``, show the table.
 
     Each point is run with so many seeds. Runs go two at a time in the ROS domain of this process

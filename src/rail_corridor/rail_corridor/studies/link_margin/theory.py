@@ -8,7 +8,7 @@ The mean level along the stretch is that of the geometry. At every place the los
   frame of 3 ms sees half a wavelength.
 
 Both know the channel; what its estimate from pilots costs is taken as a loss of Es/N0,
-``(1 - e) / (1 + e Es/N0)`` with the mean share e of the estimator's error in the power.
+``(1 - e) / (1 + e Es/N0)`` with the mean fraction e of the estimator's error in the power.
 Authority is lost after n losses in a row; from place to place these are independent, a tick being
 two wavelengths and more, so that brakings come once in ``(1 - p^n) / ((1 - p) p^n)`` ticks.
 """
@@ -50,7 +50,7 @@ _LEAST_LOSS = 1e-15
 
 
 @dataclass(frozen=True)
-class Prediction:
+class LinkPrediction:
     """What theory says of a point.
 
     ``es_n0_db`` median over the stretch of the mean Es/N0 per receive antenna [dB];
@@ -64,18 +64,18 @@ class Prediction:
     brakings_per_hour: float
 
 
-def predict(scenario: Scenario, from_share: float = 0.3) -> Prediction:
-    """Theory for a scenario whose link is weak from a share of its track on."""
+def predict(scenario: Scenario, from_fraction: float = 0.3) -> LinkPrediction:
+    """Theory for a scenario whose link is weak from a fraction of its track on."""
     plan = CBTC.of(scenario)
     assert plan is not None
-    levels_db = line_es_n0_db(scenario, from_share)
+    levels_db = line_es_n0_db(scenario, from_fraction)
     losses = math.floor(plan.timeout_s / scenario.tick_s + 1e-9)
     return theory(plan.scheme, levels_db, burst_format(plan), losses, scenario.tick_s)
 
 
 def theory(
     scheme: str, levels_db: FloatArray, burst: RadioBurstFormat, losses: int, tick_s: float
-) -> Prediction:
+) -> LinkPrediction:
     """Means over places of Es/N0 per receive antenna [place, dB].
 
     ``losses`` frames in a row, one in each tick of ``tick_s`` [s], make a train brake.
@@ -83,7 +83,7 @@ def theory(
     running = _running(scheme, levels_db, burst)
     eb_n0 = 10.0 ** (_effective_db(levels_db, burst) / 10.0) / _BITS_PER_SYMBOL
     at_rest = block_fading_frame_loss(by_name(scheme), eb_n0, burst.data_bits)
-    return Prediction(
+    return LinkPrediction(
         float(np.median(levels_db)),
         float(at_rest.mean()),
         float(running.mean()),
@@ -105,14 +105,14 @@ def _running(scheme: str, levels_db: FloatArray, burst: RadioBurstFormat) -> Flo
     return np.asarray(np.exp(loss))
 
 
-def line_es_n0_db(scenario: Scenario, from_share: float, step_m: float = 10.0) -> FloatArray:
+def line_es_n0_db(scenario: Scenario, from_fraction: float, step_m: float = 10.0) -> FloatArray:
     """Mean Es/N0 per receive antenna of the best downlink along the first track [place, dB]."""
     description, plan = cbtc_description(scenario), CBTC.of(scenario)
     assert description is not None and plan is not None
     medium = CbtcMedium(description, scenario.seed, scenario.tick_s)
     track = next(iter(scenario.network.tracks.values()))
     trains = len(description.trains)
-    places_m = np.arange(from_share * track.length_m, track.length_m, step_m)
+    places_m = np.arange(from_fraction * track.length_m, track.length_m, step_m)
     places_m = places_m[: len(places_m) // trains * trains]
     best: list[FloatArray] = []
     for batch_m in places_m.reshape(-1, trains):
@@ -157,5 +157,5 @@ def _effective_db(levels_db: FloatArray, burst: RadioBurstFormat) -> FloatArray:
     doppler = SPEED_MPS * 2.45e9 / SPEED_OF_LIGHT_M_PER_S / burst.symbol_rate_hz
     level = 10.0 ** (levels_db / 10.0)
     error = wiener_estimator(burst.pattern, doppler).error_variance(level)
-    share = error.reshape(len(level), -1).mean(axis=1)
-    return np.asarray(10.0 * np.log10(level * (1.0 - share) / (1.0 + share * level)))
+    fraction = error.reshape(len(level), -1).mean(axis=1)
+    return np.asarray(10.0 * np.log10(level * (1.0 - fraction) / (1.0 + fraction * level)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from rail_signals.localizer.filter_bank import FloatArray
 from rail_signals.localizer.localizer import Localizer
-from rail_signals.localizer.protection_level import Reason, Status
+from rail_signals.localizer.protection_level import ProtectionReason, Status
 from rail_signals.localizer.screening import Rejection
 from rail_signals.localizer.settings import LocalizerSettings, Sensor
 
@@ -67,7 +67,7 @@ class Tally:
     protection_m, error_m : float64 [...]
         Every tenth protection level and error of the claimed.
     reasons : tuple of int
-        Positions by `Reason`.
+        Positions by `ProtectionReason`.
     """
 
     sensor: Sensor | None
@@ -94,24 +94,24 @@ class _Delays:
     """Counts readings of the faulty sensor from when its error is large until it is found."""
 
     def __init__(self, runs: int) -> None:
-        self._due, self._found, self._excluded = np.zeros((3, runs), np.bool_)
+        self._due, self._detected, self._excluded = np.zeros((3, runs), np.bool_)
         self._readings = np.zeros(runs, dtype=np.int64)
 
     def tick(
-        self, large: np.ndarray, read: np.ndarray, found: np.ndarray, excluded: np.ndarray
+        self, large: np.ndarray, read: np.ndarray, detected: np.ndarray, excluded: np.ndarray
     ) -> None:
         # The reading that is the first to be off by much does not count: found in its own tick is
         # found at once.
-        self._readings += self._due & read & ~self._found
+        self._readings += self._due & read & ~self._detected
         self._due |= large
-        self._found |= found
+        self._detected |= detected
         self._excluded |= excluded
 
     def results(self, tick_s: float, most_s: float) -> tuple[FloatArray, int, int]:
         """Delays of the runs that count, how many of them are late, how many led to exclusion."""
         waited_s = self._readings * tick_s
-        counts = self._due & (self._found | (waited_s >= most_s))
-        delays_s = np.where(self._found, waited_s, np.inf)[counts]
+        counts = self._due & (self._detected | (waited_s >= most_s))
+        delays_s = np.where(self._detected, waited_s, np.inf)[counts]
         return delays_s, int((delays_s > most_s).sum()), int((counts & self._excluded).sum())
 
 
@@ -138,7 +138,7 @@ def tally(
     names = ("positions", "claimed", "misleading", "misleading_speeds", "protected")
     counts = dict.fromkeys(names, 0)
     misled, alarmed, wrong = np.zeros((3, runs), np.bool_)
-    levels, errors, reasons = [], [], np.zeros(len(Reason), dtype=np.int64)
+    levels, errors, reasons = [], [], np.zeros(len(ProtectionReason), dtype=np.int64)
     healthy_ticks = 0
     for tick in range(ticks):
         time_s = tick * tick_s
@@ -152,10 +152,10 @@ def tally(
         if fault is not None:
             readings, falsified, large = fault.apply(readings, time_s)
         estimate = localizer.tick(time_s, readings)
-        found = estimate.found.copy()
+        detected = estimate.detected.copy()
         for _, why, which in localizer.rejected:
             if why is Rejection.FROZEN:
-                found |= np.asarray(which)[:, 0]
+                detected |= np.asarray(which)[:, 0]
 
         claimed = begun & (estimate.status > Status.UNAVAILABLE)
         healthy = ~estimate.excluded
@@ -163,9 +163,9 @@ def tally(
             claimed = claimed & ~estimate.uncovered[:, fault.sensor]
             healthy = np.delete(healthy, fault.sensor, axis=1)
             out = estimate.excluded[:, fault.sensor]
-            delays.tick(begun & (falsified > large), falsified > 0.0, begun & found, begun & out)
+            delays.tick(begun & (falsified > large), falsified > 0.0, begun & detected, begun & out)
         wrong |= ~healthy.all(axis=1)
-        alarmed |= found if fault is None else found & ~begun
+        alarmed |= detected if fault is None else detected & ~begun
         s, v = truth.chainage_m, truth.speed_mps
         # What is not a number holds nothing.
         outside = claimed & ~((estimate.low_m <= s) & (s <= estimate.high_m))
@@ -175,7 +175,7 @@ def tally(
         protected = begun & (estimate.status == Status.PROTECTED)
         for name, which in zip(names, (begun, claimed, outside, too_fast, protected), strict=True):
             counts[name] += int(which.sum())
-        reasons += np.bincount(estimate.reason[begun], minlength=len(Reason))
+        reasons += np.bincount(estimate.reason[begun], minlength=len(ProtectionReason))
         if tick % 10 == 0:
             levels.append(estimate.protection_m[claimed])
             errors.append((estimate.position_m - s)[claimed])

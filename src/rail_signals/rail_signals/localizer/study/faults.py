@@ -30,7 +30,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from rail_signals.localizer.filter_bank import BoolArray, FloatArray
-from rail_signals.localizer.readings import TickReadings
+from rail_signals.localizer.readings import TickMeasurements
 from rail_signals.localizer.settings import Sensor
 
 from .simulation import SimulatedLine
@@ -135,8 +135,8 @@ class SensorFault:
         self._held: dict[str, FloatArray] = {}
 
     def apply(
-        self, readings: TickReadings, time_s: float
-    ) -> tuple[TickReadings, FloatArray, FloatArray]:
+        self, readings: TickMeasurements, time_s: float
+    ) -> tuple[TickMeasurements, FloatArray, FloatArray]:
         """Readings of a tick with the fault, by how much it falsifies them, and what is large.
 
         The second is 0 where the sensor has no reading in this tick. The third is an error that the

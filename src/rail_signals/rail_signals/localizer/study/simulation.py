@@ -19,7 +19,7 @@ from rail_signals.localizer.readings import (
     BlockEntry,
     DopplerFix,
     RangeFix,
-    TickReadings,
+    TickMeasurements,
     WheelSpeed,
 )
 
@@ -251,11 +251,11 @@ class SimulatedSensors:
         self._joint_m = np.zeros(runs)
         self._station: FloatArray | None = None
 
-    def read(self, truth: Truth) -> TickReadings:
+    def read(self, truth: Truth) -> TickMeasurements:
         """Readings of a tick."""
         self._past_m = [truth.chainage_m, *self._past_m[: self._line.most_late]]
         distance_m = np.abs(truth.chainage_m - self._past_m[min(1, len(self._past_m) - 1)])
-        return TickReadings(
+        return TickMeasurements(
             self._range(truth, distance_m),
             self._doppler(truth, distance_m),
             self._block(truth),

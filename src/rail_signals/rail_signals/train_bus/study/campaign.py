@@ -30,6 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rail_signals.train_bus.bus_line import CableSection, Coupler, Stub, Termination
 from rail_signals.train_bus.cable import Cable
 from rail_signals.train_bus.consist import CarRun, Consist, Deviations, Tolerances
 from rail_signals.train_bus.faults import (
@@ -44,7 +45,6 @@ from rail_signals.train_bus.faults import (
     WrongCable,
     place_of,
 )
-from rail_signals.train_bus.line import Coupler, Section, Stub, Termination
 from rail_signals.train_bus.profile import load_bus_profile
 from rail_signals.train_bus.tdr.interpretation import Interpretation, interpret
 from rail_signals.train_bus.tdr.reflectometer import Reflectometer, measure_consist
@@ -100,7 +100,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CaseResult:
     """What the interpretation made of a case.
 
     Parameters
@@ -156,7 +156,7 @@ def draw_consist(rng: np.random.Generator, tolerances: Tolerances | None = None)
         length = float((47.0, 27.0)[rng.integers(2)] * rng.uniform(0.95, 1.05))
         if sum(run.length_m for run in runs) + length <= LONGEST_M:
             runs.append(CarRun(cable, length))
-    node = Stub(Section(cable, float(rng.uniform(0.1, 1.0))), Termination(10e3), 30e-12)
+    node = Stub(CableSection(cable, float(rng.uniform(0.1, 1.0))), Termination(10e3), 30e-12)
     coupler = Coupler(0.02, 80e-9, 10e-12)
     load = Termination(cable.impedance_ohm)
     return Consist(tuple(runs), node, coupler, load, tolerances or Tolerances())
@@ -191,19 +191,19 @@ def draw_fault(kind: str, consist: Consist, rng: np.random.Generator) -> BusFaul
     raise ValueError(f"kind must be one of {KINDS}, got {kind!r}")
 
 
-def examine(case: Case, rng: np.random.Generator, traces: int = TRACES) -> Outcome:
+def examine(case: Case, rng: np.random.Generator, traces: int = TRACES) -> CaseResult:
     """Take the traces of a case and interpret them."""
     reflectogram = measure_consist(
         case.consist, case.deviations, case.instrument, rng, traces, case.fault
     )
-    found = interpret(reflectogram, case.consist, case.instrument)
-    if found.finding is None:
-        return Outcome(HEALTHY, math.nan, False, found)
+    interpretation = interpret(reflectogram, case.consist, case.instrument)
+    if interpretation.finding is None:
+        return CaseResult(HEALTHY, math.nan, False, interpretation)
     error = math.nan
     if case.fault is not None:
-        error = found.finding.place_m - place_of(case.fault, case.consist.line())
+        error = interpretation.finding.place_m - place_of(case.fault, case.consist.bus_line())
     allowed = max(0.5, 0.01 * case.consist.length_m)
-    return Outcome(found.finding.kind, error, abs(error) <= allowed, found)
+    return CaseResult(interpretation.finding.kind, error, abs(error) <= allowed, interpretation)
 
 
 def _draw_other(cable: Cable, rng: np.random.Generator) -> Cable:

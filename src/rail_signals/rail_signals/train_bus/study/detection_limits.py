@@ -1,8 +1,8 @@
 """How small a fault can be and still be found: the limits of detection, by theory.
 
-A fault of size q whose column is c has the statistic of `tdr_scan` distributed as chi-square of
-two degrees of freedom and the noncentrality ``q^2 c' M c``, the deviations and the backscatter
-taken out: found is what exceeds the threshold of a healthy train.
+A fault of size q whose column is c has the statistic of `rail_signals.train_bus.tdr.fault_scan`
+distributed as chi-square of two degrees of freedom and the noncentrality ``q^2 c' M c``, the
+deviations and the backscatter taken out: found is what exceeds the threshold of a healthy train.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from rail_signals.train_bus.faults import (
     WaterIngress,
     WrongCable,
 )
+from rail_signals.train_bus.tdr.fault_scan import alarm_threshold
 from rail_signals.train_bus.tdr.interpretation import FALSE_ALARM_RATE
 from rail_signals.train_bus.tdr.parts import FaultGuess
 from rail_signals.train_bus.tdr.projection import Projection
-from rail_signals.train_bus.tdr.scan import alarm_threshold
-from rail_signals.train_bus.tdr.walk import Windows
+from rail_signals.train_bus.tdr.sequential_fit import Windows
 
 from .campaign import TRACES, Case
 
@@ -40,10 +40,10 @@ _SIZES = {"bad_splice": 1, "water_ingress": 2, "wrong_cable": 0, "loose_connecto
 def detectable_size(
     case: Case,
     rng: np.random.Generator,
-    share: float,
+    fraction: float,
     false_alarm_rate: float = FALSE_ALARM_RATE,
 ) -> float:
-    """Size of a fault that is found in a share of trains like this one, somewhere in it.
+    """Size of a fault that is found in a fraction of trains like this one, somewhere in it.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def detectable_size(
         The train; of its fault only the kind counts.
     rng
         Draws the place.
-    share
+    fraction
         Probability of being found.
     false_alarm_rate
         Of the interpretation.
@@ -63,7 +63,7 @@ def detectable_size(
         which the impedance of a run is off.
     """
     threshold = alarm_threshold(case.consist, case.instrument.rise_time_s, false_alarm_rate)
-    needed = float(brentq(lambda x: ncx2.sf(threshold, 2, x) - share, 1e-3, 500.0))
+    needed = float(brentq(lambda x: ncx2.sf(threshold, 2, x) - fraction, 1e-3, 500.0))
     column = _column(case, rng)
     return math.sqrt(needed / column)
 
@@ -94,7 +94,7 @@ def _column(case: Case, rng: np.random.Generator) -> float:
     windows = Windows(
         case.consist,
         case.instrument,
-        case.instrument.samples_for(case.consist.line().delay_s),
+        case.instrument.samples_for(case.consist.bus_line().delay_s),
     )
     cars = len(case.consist.runs)
     model = windows.model(cars)

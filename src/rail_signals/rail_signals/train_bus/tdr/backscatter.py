@@ -1,11 +1,11 @@
 """What the roughness of a cable scatters back, as noise whose covariance is known.
 
 The impedance of a real cable is not constant along it. To first order each short stretch k whose
-impedance is off by a share z_k adds ``z_k c_k`` to the trace, with the column c_k of
-`tdr_model`: half of z_k for as long as the edge needs to pass it. With z a stationary process of
-standard deviation s and correlation ``exp(-|x| / l)``, whose means over the stretches have the
-covariance ``K = G G'``, the trace has, beside white noise, the covariance ``S' S`` with
-``S = G' C``. The stretches are half as long as what the reflectometer can tell apart at
+impedance is off by a fraction z_k adds ``z_k c_k`` to the trace, with the column c_k of
+`rail_signals.train_bus.tdr.model`: half of z_k for as long as the edge needs to pass it. With z a
+stationary process of standard deviation s and correlation ``exp(-|x| / l)``, whose means over the
+stretches have the covariance ``K = G G'``, the trace has, beside white noise, the covariance ``S'
+S`` with ``S = G' C``. The stretches are half as long as what the reflectometer can tell apart at
 their distance.
 
 Everything that is judged by its distance in noise is judged in the metric of both:
@@ -30,7 +30,7 @@ from .parts import Piece
 from .response import TimeGrid
 
 _LEAST_M = 0.5
-_SHARE = 0.5
+_FRACTION = 0.5
 
 
 def spread_s(cable: Cable, place_m: float, rise_time_s: float) -> float:
@@ -137,7 +137,7 @@ def backscatter_rows(
             continue
         run = consist.runs[part.run]
         start = float(consist.starts_m[part.run])
-        wanted = max(_LEAST_M, _SHARE * resolution_m(run.cable, start, rise_time_s))
+        wanted = max(_LEAST_M, _FRACTION * resolution_m(run.cable, start, rise_time_s))
         count = max(1, round(run.length_m / wanted))
         bounds += (start + run.length_m / count * np.arange(1, count + 1)).tolist()
         wave, factor = part.wave, part.impedance_factor

@@ -1,7 +1,7 @@
 """The parts of a train's line on one frequency axis, for given deviations and a supposed fault.
 
-The same line as `Consist.line` and the faults of `bus_faults` make it, but with the spectra of
-each part at hand and with the fault's values free to be changed by a fit.
+The same line as `Consist.bus_line` and the faults of `rail_signals.train_bus.faults` make it, but
+with the spectra of each part at hand and with the fault's values free to be changed by a fit.
 """
 
 from __future__ import annotations

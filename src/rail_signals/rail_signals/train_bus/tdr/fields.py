@@ -1,8 +1,9 @@
 """Voltage and current all along a train's line, on the frequency axis of a trace.
 
-The recursion is that of `bus_cascade`, over the parts of a supposed line (`tdr_chain`), keeping
-what it passes. The fields are scaled so that products of two of them transform to traces: for an
-incident wave of 1 V against R0, times the root of ``R0 / 2`` and of the incident spectrum.
+The recursion is that of `rail_signals.train_bus.cascade`, over the parts of a supposed line
+(`rail_signals.train_bus.tdr.chain`), keeping what it passes. The fields are scaled so that products
+of two of them transform to traces: for an incident wave of 1 V against R0, times the root of ``R0 /
+2`` and of the incident spectrum.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rail_signals.arrays import ComplexArray
+from rail_signals.train_bus.bus_line import BusLine, ShuntElement, Stub, Termination
 from rail_signals.train_bus.cascade import CascadePass, wave_exponential
-from rail_signals.train_bus.line import Line, ShuntElement, Stub, Termination
 
 from .parts import Chain, Piece, Series
 
@@ -54,16 +55,16 @@ class NodeModel:
         self._square = run.stub_transfer(node) ** 2 * run.s
         conductance = 0.0 if math.isinf(node.load.resistance_ohm) else 1 / node.load.resistance_ohm
         inward = (ShuntElement(conductance, node.capacitance_f), node.section)
-        voltage, current = run.head(Line(inward, Termination(0.0)))
+        voltage, current = run.head(BusLine(inward, Termination(0.0)))
         self._inner = run.s * voltage / current
 
     def admittance(self, extra_f: float) -> tuple[ComplexArray, ComplexArray]:
         """Admittance and its derivative by capacitance: each complex [frequencies]."""
         if extra_f == 0:
             return self._admittance, self._square
-        share = 1 / (1 + extra_f * self._inner)
-        slope = self._square * share
-        return self._admittance + extra_f * slope, slope * share
+        fraction = 1 / (1 + extra_f * self._inner)
+        slope = self._square * fraction
+        return self._admittance + extra_f * slope, slope * fraction
 
 
 def solve(chain: Chain, s: ComplexArray) -> Solution:

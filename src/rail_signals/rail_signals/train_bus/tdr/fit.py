@@ -1,12 +1,12 @@
 """Most probable deviations of a train, and values of a supposed fault, given a trace.
 
 Minimised is ``|x - m(theta, phi)|^2 + |theta|^2 + prior(phi)`` for a trace x, in the metric of
-its noise and of the backscatter of rough cable (`tdr_backscatter`), deviations theta in standard
-deviations and values phi of a fault, by Gauss-Newton steps, damped until they lead downhill. As
-long as the residual is larger than the noise it is taken for the noise: deviations then keep
-near their priors instead of imitating what the supposed fault does not yet explain. Of a healthy
-train the least cost is distributed as chi-square with as many degrees of freedom as there are
-samples, whatever the number of deviations: each of them brings its own prior.
+its noise and of the backscatter of rough cable (`rail_signals.train_bus.tdr.backscatter`),
+deviations theta in standard deviations and values phi of a fault, by Gauss-Newton steps, damped
+until they lead downhill. As long as the residual is larger than the noise it is taken for the
+noise: deviations then keep near their priors instead of imitating what the supposed fault does not
+yet explain. Of a healthy train the least cost is distributed as chi-square with as many degrees of
+freedom as there are samples, whatever the number of deviations: each of them brings its own prior.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rail_signals.arrays import FloatArray
 
 from .backscatter import Metric
 from .hypotheses import VALUES, clipped, log_expected_range, prior_cost, prior_gradient
-from .model import Prediction, TraceModel
+from .model import TraceModel, TracePrediction
 from .parts import FaultGuess
 
 _TRIES = 6
@@ -52,7 +52,7 @@ class Fit:
     cost: float
     deviations: FloatArray
     fault: FaultGuess | None
-    prediction: Prediction
+    prediction: TracePrediction
     residual: FloatArray
     metric: Metric
 
@@ -111,41 +111,41 @@ def fit(
     best = _evaluate(model, seen, metric, deviations, fault)
     damping = 0.0
     for _ in range(steps):
-        found, damping = _step(model, seen, best, damping)
-        if found is None:
+        fitted, damping = _step(model, seen, best, damping)
+        if fitted is None:
             break
-        gained = _tempered(best, best.tension) - _tempered(found, best.tension)
-        best = found
+        gained = _tempered(best, best.tension) - _tempered(fitted, best.tension)
+        best = fitted
         if gained < _SETTLED:
             break
     return best
 
 
-def evidence(model: TraceModel, found: Fit) -> float:
+def evidence(model: TraceModel, fitted: Fit) -> float:
     """Minus twice the logarithm of the evidence of a fit's kind of fault (Laplace's method).
 
     The cost, and for each value of the fault the logarithm of how much of the range expected
     beforehand the trace still allows. Differences to other kinds, and to no fault at all, have
     meaning.
     """
-    if found.fault is None:
-        return found.cost
-    matrix, _ = _normal_equations(found, 1.0)
-    size = len(found.prediction.rows)
+    if fitted.fault is None:
+        return fitted.cost
+    matrix, _ = _normal_equations(fitted, 1.0)
+    size = len(fitted.prediction.rows)
     factor = cholesky(matrix[:size, :size], lower=True)
     cross = solve_triangular(factor, matrix[:size, size:], lower=True)
     rest = matrix[size:, size:] - cross.T @ cross
     _, log_det = np.linalg.slogdet(rest)
-    count = len(found.fault.values)
-    ranges = log_expected_range(model.consist, found.fault.kind)
-    return float(found.cost + log_det - count * math.log(2 * math.pi) + 2 * ranges)
+    count = len(fitted.fault.values)
+    ranges = log_expected_range(model.consist, fitted.fault.kind)
+    return float(fitted.cost + log_det - count * math.log(2 * math.pi) + 2 * ranges)
 
 
-def fault_std(found: Fit) -> FloatArray:
+def fault_std(fitted: Fit) -> FloatArray:
     """Standard deviations of the values of the fault, from the curvature: [values]."""
-    assert found.fault is not None
-    matrix, _ = _normal_equations(found, 1.0)
-    size = len(found.prediction.rows)
+    assert fitted.fault is not None
+    matrix, _ = _normal_equations(fitted, 1.0)
+    size = len(fitted.prediction.rows)
     unit = np.eye(len(matrix))[:, size:]
     return np.sqrt(np.diag(cho_solve(cho_factor(matrix), unit)[size:]))
 
@@ -220,9 +220,9 @@ def _step(model: TraceModel, seen: FloatArray, at: Fit, damping: float) -> tuple
         if fault is not None:
             values = fault.values + step[size:]
             fault = clipped(model.consist, FaultGuess(fault.kind, fault.index, values))
-        found = _evaluate(model, seen, at.metric, moved, fault)
-        if _tempered(found, tension) <= before:
-            return found, damping * 0.2
+        fitted = _evaluate(model, seen, at.metric, moved, fault)
+        if _tempered(fitted, tension) <= before:
+            return fitted, damping * 0.2
         damping = max(10 * damping, 1e-2)
     return None, damping
 

@@ -2,7 +2,7 @@
 
 A fit needs limits, so that no step leaves the line, and the choice between kinds needs the
 ranges in which the values were expected beforehand: a kind with more values to choose explains
-more, and has to explain better (`evidence` in `tdr_fit`).
+more, and has to explain better (`evidence` in `rail_signals.train_bus.tdr.fit`).
 """
 
 from __future__ import annotations

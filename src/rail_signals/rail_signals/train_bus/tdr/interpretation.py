@@ -1,14 +1,16 @@
 """From the reflectogram of a train to what is wrong with it.
 
-A healthy train is fitted from the head on (`tdr_walk`). If it explains the trace and a scan of
-all places finds nothing above the threshold, the train is healthy. Otherwise faults of all kinds
-are fitted (`tdr_search`), and the most probable is reported.
+A healthy train is fitted from the head on (`rail_signals.train_bus.tdr.sequential_fit`). If it
+explains the trace and a scan of all places finds nothing above the threshold, the train is healthy.
+Otherwise faults of all kinds are fitted (`rail_signals.train_bus.tdr.search`), and the most
+probable is reported.
 
-The threshold (`alarm_threshold` in `tdr_scan`) holds the rate of false alarms.
+The threshold (`alarm_threshold` in `rail_signals.train_bus.tdr.fault_scan`) holds the rate of false
+alarms.
 
-Between kinds decides the evidence (`tdr_fit`), and two things beside the trace: a shield that
-floats lets the noise rise, and a loose connector is told from a steady splice by what changes
-between traces.
+Between kinds decides the evidence (`rail_signals.train_bus.tdr.fit`), and two things beside the
+trace: a shield that floats lets the noise rise, and a loose connector is told from a steady splice
+by what changes between traces.
 """
 
 from __future__ import annotations
@@ -21,18 +23,18 @@ import numpy as np
 from rail_signals.arrays import FloatArray
 from rail_signals.train_bus.consist import Consist, Deviations
 
+from .fault_scan import alarm_threshold
 from .fit import Fit, evidence, fault_std
 from .hypotheses import PLACED, VALUES, place_m
 from .parts import FaultGuess
 from .reflectometer import Reflectogram, Reflectometer
-from .scan import alarm_threshold
-from .scene import Scene, scene_of
-from .search import Candidate, candidates
+from .residual_scan import ResidualScan, scan_residual
+from .search import FaultCandidate, candidates
+from .sequential_fit import SequentialFit, Windows, fit_sequentially
 from .traces import TraceSummary, summarise
-from .walk import Walk, Windows, walk
 
 FALSE_ALARM_RATE = 2e-3
-"""Share of healthy trains that may be flagged."""
+"""Fraction of healthy trains that may be flagged."""
 
 _RATIO_STD = 0.05
 _RATIO_LEAST = 1.15
@@ -125,7 +127,7 @@ def interpret(
     instrument
         The reflectometer; its sample period must be that of the record.
     false_alarm_rate
-        Share of healthy trains that may be flagged.
+        Fraction of healthy trains that may be flagged.
 
     Raises
     ------
@@ -149,38 +151,46 @@ def interpret(
         trace, sigma = summary.highest, summary.noise_rms
     else:
         trace, sigma = summary.mean, summary.noise_rms / math.sqrt(summary.traces)
-    walked = walk(windows, trace, sigma)
-    scene = scene_of(windows, trace, sigma, walked)
-    if walked.healthy is not None and walked.failed is None and scene.scanned.largest > threshold:
+    sequential = fit_sequentially(windows, trace, sigma)
+    residual_scan = scan_residual(windows, trace, sigma, sequential)
+    if (
+        sequential.healthy is not None
+        and sequential.failed is None
+        and residual_scan.fault_scan.largest > threshold
+    ):
         # Once more with what this train scatters back, not one a few per cent off.
         windows.forget(windows.cars)
-        again = windows.fit(trace, sigma, windows.cars, walked.healthy.deviations)
-        walked = replace(walked, healthy=again)
-        scene = scene_of(windows, trace, sigma, walked)
-    statistic = math.inf if walked.failed is not None else scene.scanned.largest
-    found: list[Candidate] = []
+        again = windows.fit(trace, sigma, windows.cars, sequential.healthy.deviations)
+        sequential = replace(sequential, healthy=again)
+        residual_scan = scan_residual(windows, trace, sigma, sequential)
+    statistic = math.inf if sequential.failed is not None else residual_scan.fault_scan.largest
+    ranked: list[FaultCandidate] = []
     if summary.change is not None:
-        found = _loose(windows, trace, sigma, scene, summary.change)
+        ranked = _loose(windows, trace, sigma, residual_scan, summary.change)
     elif statistic > threshold:
-        found = candidates(windows, trace, sigma, scene)
-        if found[0].fit.excess > _UNEXPLAINED:
-            found = candidates(windows, trace, sigma, scene, thorough=True)
-        if walked.healthy is None:
+        ranked = candidates(windows, trace, sigma, residual_scan)
+        if ranked[0].fit.excess > _UNEXPLAINED:
+            ranked = candidates(windows, trace, sigma, residual_scan, thorough=True)
+        if sequential.healthy is None:
             # A fault in the first run was looked for before the batch was known: now it is.
-            about = scene_of(windows, trace, sigma, walked, found[0].fit.deviations)
-            found = _distinct(found + candidates(windows, trace, sigma, about))
-    return _report(windows, summary, walked, found, statistic, threshold)
+            about = scan_residual(windows, trace, sigma, sequential, ranked[0].fit.deviations)
+            ranked = _distinct(ranked + candidates(windows, trace, sigma, about))
+    return _report(windows, summary, sequential, ranked, statistic, threshold)
 
 
 def _loose(
-    windows: Windows, trace: FloatArray, sigma: float, scene: Scene, change: FloatArray
-) -> list[Candidate]:
+    windows: Windows,
+    trace: FloatArray,
+    sigma: float,
+    residual_scan: ResidualScan,
+    change: FloatArray,
+) -> list[FaultCandidate]:
     """The loose connector whose contact makes the change between traces.
 
     In the change nothing is left of the tolerances: at the right coupler it is all that a
     resistance and an inductance there could do.
     """
-    model, fields = scene.model, scene.fields
+    model, fields = residual_scan.model, residual_scan.fields
     couplers, rows = [], []
     for port, part in enumerate(fields.chain.parts):
         number = getattr(part, "coupler", None)
@@ -188,29 +198,31 @@ def _loose(
             couplers.append(int(number))
             rows.append(np.square(fields.current[port]))
     if not couplers:
-        return candidates(windows, trace, sigma, scene)
+        return candidates(windows, trace, sigma, residual_scan)
     squares = np.stack(rows)
     columns = np.stack(
         [model.grid.to_time(squares), model.grid.to_time(squares * (model.s * 1e-9))], axis=1
     )
     seen = change[: model.grid.samples]
     order = np.argsort([_unexplained(pair, seen) for pair in columns])
-    found = []
+    ranked = []
     for k in order[:_MOST_COUPLERS]:
         guess = FaultGuess("loose_connector", couplers[k], np.array([5.0, 50.0]))
-        runs = max(scene.runs, couplers[k] + 1)
-        fit = windows.fit(trace, sigma, runs, scene.base.deviations, guess, steps=10)
+        runs = max(residual_scan.runs, couplers[k] + 1)
+        fit = windows.fit(trace, sigma, runs, residual_scan.base.deviations, guess, steps=10)
         for longer in windows.strides(runs):
             fit = windows.fit(trace, sigma, longer, fit.deviations, fit.fault, steps=4)
         score = evidence(windows.model(windows.cars), fit)
-        found.append(Candidate(fit, score + _unexplained(fit.prediction.fault_jacobian, change)))
-    return sorted(found, key=lambda candidate: candidate.score)
+        ranked.append(
+            FaultCandidate(fit, score + _unexplained(fit.prediction.fault_jacobian, change))
+        )
+    return sorted(ranked, key=lambda candidate: candidate.score)
 
 
-def _distinct(found: list[Candidate]) -> list[Candidate]:
+def _distinct(ranked: list[FaultCandidate]) -> list[FaultCandidate]:
     """Candidates without those that another one, as good or better, repeats; the best first."""
-    kept: list[Candidate] = []
-    for one in sorted(found, key=lambda candidate: candidate.score):
+    kept: list[FaultCandidate] = []
+    for one in sorted(ranked, key=lambda candidate: candidate.score):
         if not any(_is_same(one.fault, other.fault) for other in kept):
             kept.append(one)
     return kept
@@ -234,8 +246,8 @@ def _unexplained(columns: FloatArray, change: FloatArray) -> float:
 def _report(
     windows: Windows,
     summary: TraceSummary,
-    walked: Walk,
-    found: list[Candidate],
+    sequential: SequentialFit,
+    ranked: list[FaultCandidate],
     statistic: float,
     threshold: float,
 ) -> Interpretation:
@@ -243,7 +255,7 @@ def _report(
     consist = windows.consist
     ratio = summary.noise_rms / windows.instrument.noise_rms
     scores = []
-    for candidate in found:
+    for candidate in ranked:
         odds = _log_noise_odds(candidate.fault.kind, ratio, summary.noise_std)
         if candidate.fault.kind == "loose_connector" and summary.change is None:
             # A contact that is loose seldom stays the same from trace to trace.
@@ -254,15 +266,15 @@ def _report(
     if len(order):
         weights = np.exp(-0.5 * (np.array(scores)[order] - scores[order[0]]))
         weights /= weights.sum()
-        best = found[order[0]]
+        best = ranked[order[0]]
         finding = _finding(consist, best, float(weights[0]))
         alternatives = [
-            (found[k].fault.kind, float(weight))
+            (ranked[k].fault.kind, float(weight))
             for k, weight in zip(order[1:], weights[1:], strict=True)
         ]
         fit = best.fit
     else:
-        fit = walked.failed if walked.failed is not None else walked.healthy
+        fit = sequential.failed if sequential.failed is not None else sequential.healthy
         assert fit is not None
     return Interpretation(
         finding,
@@ -278,7 +290,7 @@ def _report(
     )
 
 
-def _finding(consist: Consist, candidate: Candidate, probability: float) -> Finding:
+def _finding(consist: Consist, candidate: FaultCandidate, probability: float) -> Finding:
     fault = candidate.fault
     errors = fault_std(candidate.fit)
     placed = fault.kind in PLACED

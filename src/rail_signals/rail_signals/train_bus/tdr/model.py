@@ -40,7 +40,7 @@ _COLUMNS = 16
 
 
 @dataclass(frozen=True)
-class Prediction:
+class TracePrediction:
     """A trace and its derivatives.
 
     Parameters
@@ -102,7 +102,7 @@ class TraceModel:
         self._node = None if node is None else NodeModel(node, CascadePass(self.s))
 
     def backscatter(self, deviations: FloatArray) -> FloatArray:
-        """What the roughness of a train scatters back: see `tdr_backscatter`."""
+        """What the roughness of a train scatters back: see `.backscatter`."""
         rise = self.instrument.rise_time_s
         return backscatter_rows(self.consist, rise, self.grid, self.s, self.fields(deviations))
 
@@ -131,7 +131,7 @@ class TraceModel:
         current[-1] *= scale
         return Fields(chain, voltage, current, response)
 
-    def predict(self, deviations: FloatArray, fault: FaultGuess | None = None) -> Prediction:
+    def predict(self, deviations: FloatArray, fault: FaultGuess | None = None) -> TracePrediction:
         """The trace and its derivatives.
 
         Parameters
@@ -189,7 +189,7 @@ class TraceModel:
         scales: list[float],
         count: int,
         reached: int,
-    ) -> Prediction:
+    ) -> TracePrediction:
         """Transform all columns at once, and add those that need no transform of their own."""
         t = self.consist.tolerances
         waves = self.grid.to_time(self._work[:count], self._scratch[:count])
@@ -207,7 +207,7 @@ class TraceModel:
         waves[2 + len(rows) :] *= gain
         index = np.array([*rows, 0, 1, 4, 5, 6])
         jacobian = np.concatenate([waves[own], common])
-        return Prediction(shown, index, jacobian, waves[2 + len(rows) :])
+        return TracePrediction(shown, index, jacobian, waves[2 + len(rows) :])
 
     def _piece_columns(
         self, fields: Fields
@@ -247,28 +247,28 @@ class TraceModel:
         waves = {id(piece.wave): piece.wave for piece in chain.pieces}
         column = np.zeros_like(self.s)
         for key, total in sums.items():
-            column += total * (0.5 * (waves[key].resistive_share + waves[key].skin_share))
+            column += total * (0.5 * (waves[key].resistive_fraction + waves[key].skin_fraction))
         return column
 
     def _lumped_columns(self, fields: Fields) -> list[tuple[int, float, ComplexArray]]:
         """Row, scale and column of nodes, couplers and the terminator."""
         cars, t = len(self.consist.runs), self.consist.tolerances
         voltage, current = fields.voltage, fields.current
-        found = []
+        columns = []
         for port, part in enumerate(fields.chain.parts):
             if isinstance(part, Shunt) and part.slope is not None and self.consist.node:
                 scale = -t.node_capacitance * self.consist.node.capacitance_f
                 column = np.square(voltage[port]) * part.slope
-                found.append((COMMON + 2 * cars + part.run, scale, column))
+                columns.append((COMMON + 2 * cars + part.run, scale, column))
             elif isinstance(part, Series) and part.coupler is not None:
                 scale = t.coupler_inductance * self.consist.coupler.inductance_h
                 if scale:
                     column = np.square(current[port]) * self.s
-                    found.append((COMMON + 3 * cars + part.coupler, scale, column))
+                    columns.append((COMMON + 3 * cars + part.coupler, scale, column))
         load = fields.chain.load_ohm
         if fields.chain.is_terminated and load is not None and math.isfinite(load):
-            found.append((3, t.termination * load, np.square(current[-1])))
-        return found
+            columns.append((3, t.termination * load, np.square(current[-1])))
+        return columns
 
     def _fault_columns(
         self,
@@ -300,13 +300,13 @@ class TraceModel:
         assert isinstance(part, Piece)
         z, d = by_impedance[piece], by_length[piece]
         if fault.kind == "water_ingress":
-            share = (0.5 * (d - z)) / part.wave.shunt
+            fraction = (0.5 * (d - z)) / part.wave.shunt
             wet = s * self.consist.runs[part.run].cable.capacitance_f_per_m
             place = stretch * (density[piece - 1] - density[piece + 1])
             length = stretch * (density[piece] - density[piece + 1])
-            return [place, length, share * wet, share * MICRO]
+            return [place, length, fraction * wet, fraction * MICRO]
         half = 0.5 * (z + d)
-        resistance, skin = half * part.wave.resistive_share, half * part.wave.skin_share
+        resistance, skin = half * part.wave.resistive_fraction, half * part.wave.skin_fraction
         if fault.kind == "wrong_cable":
             return [z, d, resistance, skin]
         return [z, resistance + skin]

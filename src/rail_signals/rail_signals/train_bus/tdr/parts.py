@@ -1,6 +1,7 @@
 """Parts of a supposed line on one frequency axis: cable, what is in series, what is across.
 
-`tdr_chain` puts them together for given deviations of a train and a supposed fault.
+`rail_signals.train_bus.tdr.chain` puts them together for given deviations of a train and a supposed
+fault.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.train_bus.cable import Cable
-from rail_signals.train_bus.line_constants import complex_root
+from rail_signals.train_bus.cable_constants import complex_root
 
 NANO: Final = 1e-9
 """Inductances among the values of a fault are in nanohenry."""
@@ -58,9 +59,9 @@ class WaveSpectra:
     admittance: ComplexArray
     shunt: ComplexArray
     """Shunt admittance per metre [S/m]."""
-    resistive_share: ComplexArray
+    resistive_fraction: ComplexArray
     """Derivative of the logarithm of the series impedance by that of the resistance."""
-    skin_share: ComplexArray
+    skin_fraction: ComplexArray
     """The same by the factor of the skin effect."""
 
 
@@ -112,11 +113,11 @@ class Waves:
             impedance,
             1 / impedance,
             shunt,
-            *_shares(direct, skin, own * series),
+            *_fractions(direct, skin, own * series),
         )
 
 
-def _shares(
+def _fractions(
     direct: float, skin: ComplexArray, product: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
     """Shares of direct and alternating resistance: those of the squares in ``own / series``."""

@@ -7,7 +7,7 @@ has its middle at ``2 d / v``.
 
 The window is as long as a wave needs to the far end and back, 15 % more for echoes between
 faults and for tolerances, and 1 us for the tail of a last edge. Nothing folds into it: see
-`tdr_response`.
+`rail_signals.train_bus.tdr.response`.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rail_signals.arrays import FloatArray
+from rail_signals.train_bus.bus_line import BusLine
 from rail_signals.train_bus.consist import Consist, Deviations
 from rail_signals.train_bus.faults import BusFault, LooseConnector, MissingShieldGround
-from rail_signals.train_bus.line import Line
 from rail_signals.train_bus.roughness import draw_roughness, roughened
 
 from .response import SAMPLES_PER_RISE, Excitation, TimeGrid, lead_in_s, reflected_wave
 
-_WINDOW_SHARE = 1.15
+_WINDOW_FRACTION = 1.15
 _WINDOW_TAIL_S = 1e-6
 
 
@@ -84,7 +84,7 @@ class Reflectometer:
 
     def samples_for(self, delay_s: float) -> int:
         """Samples of the window of a line through which a wave takes a given time."""
-        window = 2 * delay_s * _WINDOW_SHARE + _WINDOW_TAIL_S - self.start_s
+        window = 2 * delay_s * _WINDOW_FRACTION + _WINDOW_TAIL_S - self.start_s
         return math.ceil(window / self.sample_period_s)
 
     def grid(self, samples: int, start_s: float | None = None) -> TimeGrid:
@@ -132,7 +132,7 @@ class Reflectogram:
 
 
 def measure(
-    line: Line,
+    bus_line: BusLine,
     instrument: Reflectometer,
     rng: np.random.Generator,
     traces: int = 1,
@@ -146,7 +146,7 @@ def measure(
 
     Parameters
     ----------
-    line
+    bus_line
         The line without the fault.
     instrument
         The reflectometer.
@@ -159,8 +159,8 @@ def measure(
     samples
         Samples of each trace; by default the instrument's window for the line.
     """
-    grid = instrument.grid(samples or instrument.samples_for(line.delay_s))
-    clean = np.stack([_wave(one, instrument, grid) for one in _lines(line, fault, rng, traces)])
+    grid = instrument.grid(samples or instrument.samples_for(bus_line.delay_s))
+    clean = np.stack([_wave(one, instrument, grid) for one in _lines(bus_line, fault, rng, traces)])
     factor = fault.noise_factor if isinstance(fault, MissingShieldGround) else 1.0
     noise = rng.standard_normal((traces, grid.samples))
     return Reflectogram(grid.time_s, clean + instrument.noise_rms * factor * noise)
@@ -180,16 +180,16 @@ def measure_consist(
     """
     tolerances = consist.tolerances
     rough = draw_roughness(consist, rng)
-    nominal = instrument.grid(instrument.samples_for(consist.line().delay_s))
+    nominal = instrument.grid(instrument.samples_for(consist.bus_line().delay_s))
     # Twice the sample rate of the record: a transform of its own beside those of a fit.
     late = nominal.start_s + tolerances.trigger_s * deviations.trigger
     fine = TimeGrid(2 * nominal.samples, nominal.sample_period_s / 2, late)
     waves: dict[int, FloatArray] = {}
-    lines = _lines(consist.line(deviations), fault, rng, traces)
-    for line in lines:
-        if id(line) not in waves:
-            waves[id(line)] = _wave(roughened(line, rough), instrument, fine)[::2]
-    clean = np.stack([waves[id(line)] for line in lines])
+    lines = _lines(consist.bus_line(deviations), fault, rng, traces)
+    for bus_line in lines:
+        if id(bus_line) not in waves:
+            waves[id(bus_line)] = _wave(roughened(bus_line, rough), instrument, fine)[::2]
+    clean = np.stack([waves[id(bus_line)] for bus_line in lines])
     clean *= 1 + tolerances.gain * deviations.gain
     clean += tolerances.offset * deviations.offset
     factor = fault.noise_factor if isinstance(fault, MissingShieldGround) else 1.0
@@ -202,19 +202,22 @@ def distance_m(time_s: ArrayLike, velocity_m_per_s: float) -> FloatArray:
     return np.asarray(np.asarray(time_s, dtype=np.float64) * velocity_m_per_s / 2)
 
 
-def _lines(line: Line, fault: BusFault | None, rng: np.random.Generator, traces: int) -> list[Line]:
+def _lines(
+    bus_line: BusLine, fault: BusFault | None, rng: np.random.Generator, traces: int
+) -> list[BusLine]:
     """The line as each trace meets it."""
     if fault is None:
-        return [line] * traces
+        return [bus_line] * traces
     if not isinstance(fault, LooseConnector) or fault.spread == 0:
-        return [fault.apply(line)] * traces
+        return [fault.apply(bus_line)] * traces
     factors = np.exp(fault.spread * rng.standard_normal(traces))
     return [
-        replace(fault, resistance_ohm=fault.resistance_ohm * float(f)).apply(line) for f in factors
+        replace(fault, resistance_ohm=fault.resistance_ohm * float(f)).apply(bus_line)
+        for f in factors
     ]
 
 
-def _wave(line: Line, instrument: Reflectometer, grid: TimeGrid) -> FloatArray:
+def _wave(bus_line: BusLine, instrument: Reflectometer, grid: TimeGrid) -> FloatArray:
     return reflected_wave(
-        line, grid, instrument.reference_ohm, instrument.rise_time_s, instrument.excitation
+        bus_line, grid, instrument.reference_ohm, instrument.rise_time_s, instrument.excitation
     )

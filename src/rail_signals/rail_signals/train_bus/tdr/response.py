@@ -26,8 +26,8 @@ import numpy as np
 from scipy import fft
 
 from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.train_bus.bus_line import BusLine
 from rail_signals.train_bus.cascade import reflection_at
-from rail_signals.train_bus.line import Line
 
 RISE_PER_SIGMA: Final = 2.5631031310892007
 """10 to 90 % rise time of a Gaussian edge over its standard deviation."""
@@ -39,7 +39,7 @@ _FOLD: Final = 13.0
 """Nepers by which the damping lowers what folds back."""
 
 _GUARD: Final = 0.25
-"""Share of the transform behind the part that is used: there the damping would lift rounding."""
+"""Fraction of the transform behind the part that is used: there the damping would lift rounding."""
 
 Excitation = Literal["step", "pulse"]
 
@@ -148,7 +148,7 @@ def lead_in_s(rise_time_s: float) -> float:
 
 
 def reflected_wave(
-    line: Line,
+    bus_line: BusLine,
     grid: TimeGrid,
     reference_ohm: float,
     rise_time_s: float,
@@ -158,7 +158,7 @@ def reflected_wave(
 
     Parameters
     ----------
-    line
+    bus_line
         The line.
     grid
         Samples; they should begin :func:`lead_in_s` before 0.
@@ -174,4 +174,4 @@ def reflected_wave(
     float64 [samples]
     """
     spectrum = incident_spectrum(grid, rise_time_s, excitation)
-    return grid.to_time(reflection_at(line, grid.laplace_axis(), reference_ohm) * spectrum)
+    return grid.to_time(reflection_at(bus_line, grid.laplace_axis(), reference_ohm) * spectrum)

@@ -1,8 +1,8 @@
 """Faults that could explain a trace: starts from matched filters, fits, and the best of each kind.
 
-From every peak of the scan (`tdr_scan`) each kind of fault that could look like it starts a
-fit. What a resistance in series would have to be there tells open and short from the rest: they
-reflect nearly everything.
+From every peak of the scan (`rail_signals.train_bus.tdr.fault_scan`) each kind of fault that could
+look like it starts a fit. What a resistance in series would have to be there tells open and short
+from the rest: they reflect nearly everything.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import numpy as np
 
 from rail_signals.arrays import FloatArray
 
+from .cable_substitution import likely_substitutions
+from .fault_scan import WET_LENGTHS_M, scan_water
 from .fit import Fit, evidence
 from .hypotheses import VALUES
 from .parts import NANO, FaultGuess
-from .scan import WET_LENGTHS_M, scan_water
-from .scene import AHEAD_M, Scene, blur_m
-from .swap import likely_swaps
-from .walk import Windows
+from .residual_scan import AHEAD_M, ResidualScan, blur_m
+from .sequential_fit import Windows
 
 _PEAKS = 2
 _APART_M = 5.0
@@ -40,7 +40,7 @@ _MOST_FINAL = 4
 
 
 @dataclass(frozen=True)
-class Candidate:
+class FaultCandidate:
     """A fault that was fitted, and minus twice the logarithm of its evidence."""
 
     fit: Fit
@@ -54,40 +54,46 @@ class Candidate:
 
 
 def candidates(
-    windows: Windows, trace: FloatArray, sigma: float, scene: Scene, thorough: bool = False
-) -> list[Candidate]:
+    windows: Windows,
+    trace: FloatArray,
+    sigma: float,
+    residual_scan: ResidualScan,
+    thorough: bool = False,
+) -> list[FaultCandidate]:
     """Faults of different kinds that explain the whole trace best, the best first.
 
     Parameters
     ----------
-    windows, trace, sigma, scene
+    windows, trace, sigma, residual_scan
         The trace, its noise, and where to look.
     thorough
         Try every start there is.
     """
-    base, runs = scene.base, scene.runs
-    guesses = list(_starts(windows, scene, thorough))
+    base, runs = residual_scan.base, residual_scan.runs
+    guesses = list(_starts(windows, residual_scan, thorough))
     if not thorough:
-        guesses = _best_starts(scene, guesses)
+        guesses = _best_starts(residual_scan, guesses)
     # Before the batch is known, costs are less sure; but windows are short.
-    steps, most = (_SHORT_STEPS, _MOST_FITS) if scene.is_started else (_FIRST_STEPS, _MOST_STARTS)
+    steps, most = (
+        (_SHORT_STEPS, _MOST_FITS) if residual_scan.is_started else (_FIRST_STEPS, _MOST_STARTS)
+    )
     fits = [
         windows.fit(trace, sigma, runs, base.deviations, guess, steps=steps) for guess in guesses
     ]
     fits = [
-        windows.fit(trace, sigma, runs, found.deviations, found.fault, steps=_LONG_STEPS)
-        for found in _leaders(fits, 2.0, most)
+        windows.fit(trace, sigma, runs, ranked.deviations, ranked.fault, steps=_LONG_STEPS)
+        for ranked in _leaders(fits, 2.0, most)
     ]
     fits = _leaders(fits, 1.0, _MOST_FINAL)
     for longer in windows.strides(runs):
         fits = [
-            windows.fit(trace, sigma, longer, found.deviations, found.fault, steps=4)
-            for found in fits
+            windows.fit(trace, sigma, longer, ranked.deviations, ranked.fault, steps=4)
+            for ranked in fits
         ]
         fits = _leaders(fits, 1.0, _MOST_FINAL)
     whole = windows.model(windows.cars)
-    found = [Candidate(fit, evidence(whole, fit)) for fit in fits]
-    return sorted(found, key=lambda candidate: candidate.score)
+    ranked = [FaultCandidate(fit, evidence(whole, fit)) for fit in fits]
+    return sorted(ranked, key=lambda candidate: candidate.score)
 
 
 def _leaders(fits: list[Fit], factor: float, most: int) -> list[Fit]:
@@ -107,45 +113,60 @@ def _look(fault: FaultGuess) -> tuple[str, int, int]:
     return fault.kind, fault.index, delay
 
 
-def _best_starts(scene: Scene, guesses: list[FaultGuess]) -> list[FaultGuess]:
+def _best_starts(residual_scan: ResidualScan, guesses: list[FaultGuess]) -> list[FaultGuess]:
     """The best starts, judged without a fit, few of a kind in one place."""
-    base = scene.base
-    traces = [scene.model.trace(base.deviations, guess) for guess in guesses]
+    base = residual_scan.base
+    traces = [residual_scan.model.trace(base.deviations, guess) for guess in guesses]
     changes = (np.stack(traces) - base.prediction.trace) / base.sigma
-    costs = scene.projection.costs(changes)
+    costs = residual_scan.projection.costs(changes)
     limit = np.inf
-    if scene.is_whole:
+    if residual_scan.is_explained:
         limit = np.min(costs) + _BEHIND / 4
-    elif scene.is_started:
+    elif residual_scan.is_started:
         limit = 3 * np.min(costs) + 1000.0
-    taken: dict[tuple[str, int], int] = {}
+    counts: dict[tuple[str, int], int] = {}
     kinds: set[str] = set()
     chosen: list[FaultGuess] = []
     for k in np.argsort(costs):
         guess = guesses[k]
         key = (guess.kind, guess.index)
         likely = costs[k] <= limit and len(chosen) < _MOST_STARTS
-        if (likely and taken.get(key, 0) < 3) or (guess.kind not in kinds and not scene.is_whole):
-            taken[key] = taken.get(key, 0) + 1
+        if (likely and counts.get(key, 0) < 3) or (
+            guess.kind not in kinds and not residual_scan.is_explained
+        ):
+            counts[key] = counts.get(key, 0) + 1
             kinds.add(guess.kind)
             chosen.append(guess)
     return chosen
 
 
-def _starts(windows: Windows, scene: Scene, thorough: bool) -> Iterator[FaultGuess]:
+def _starts(windows: Windows, residual_scan: ResidualScan, thorough: bool) -> Iterator[FaultGuess]:
     """Faults that could have left what the scan found."""
-    yield from _lumped_starts(windows, scene, thorough)
+    yield from _lumped_starts(windows, residual_scan, thorough)
     if thorough:
-        yield from _wet_starts(windows, scene)
-    for low, high in _stretches(windows, scene):
-        found = scan_water(scene.model, scene.base, scene.fields, scene.projection, low, high)
+        yield from _wet_starts(windows, residual_scan)
+    for low, high in _stretches(windows, residual_scan):
+        found = scan_water(
+            residual_scan.model,
+            residual_scan.base,
+            residual_scan.fields,
+            residual_scan.projection,
+            low,
+            high,
+        )
         for _, place, length, rise in sorted(found, reverse=True)[:3]:
             run = windows.run_at(place)
             inside = place - float(windows.consist.starts_m[run])
             wet = np.array([inside, length, min(max(rise, 0.05), 0.8), 1.0])
             yield FaultGuess("water_ingress", run, wet)
-    for run in _runs(windows, scene):
-        swaps = likely_swaps(scene.model, scene.base, scene.fields, scene.projection, run)
+    for run in _runs(windows, residual_scan):
+        swaps = likely_substitutions(
+            residual_scan.model,
+            residual_scan.base,
+            residual_scan.fields,
+            residual_scan.projection,
+            run,
+        )
         delays: list[float] = []
         for _, impedance, delay in swaps:
             if len(delays) < 3 and all(abs(delay - other) > 0.1 for other in delays):
@@ -156,11 +177,13 @@ def _starts(windows: Windows, scene: Scene, thorough: bool) -> Iterator[FaultGue
         yield FaultGuess("missing_shield_ground", run, np.array([impedance, mean]))
 
 
-def _lumped_starts(windows: Windows, scene: Scene, thorough: bool) -> Iterator[FaultGuess]:
+def _lumped_starts(
+    windows: Windows, residual_scan: ResidualScan, thorough: bool
+) -> Iterator[FaultGuess]:
     """Faults in one place, at the peaks of the scan."""
-    scanned, consist = scene.scanned, windows.consist
+    scanned, consist = residual_scan.fault_scan, windows.consist
     couplers: dict[int, tuple[float, float]] = {}
-    for peak in _peaks(scene, 2 * _PEAKS if thorough else _PEAKS, _APART_M):
+    for peak in _peaks(residual_scan, 2 * _PEAKS if thorough else _PEAKS, _APART_M):
         place = float(scanned.place_m[peak])
         run = windows.run_at(place)
         loop = 2 * consist.runs[run].cable.impedance_ohm
@@ -178,14 +201,14 @@ def _lumped_starts(windows: Windows, scene: Scene, thorough: bool) -> Iterator[F
         for coupler in np.flatnonzero(near).tolist():
             couplers.setdefault(coupler, (resistance, inductance))
     for coupler, values in couplers.items():
-        if coupler < scene.runs:
+        if coupler < residual_scan.runs:
             yield FaultGuess("loose_connector", coupler, np.array(values))
 
 
-def _wet_starts(windows: Windows, scene: Scene) -> Iterator[FaultGuess]:
+def _wet_starts(windows: Windows, residual_scan: ResidualScan) -> Iterator[FaultGuess]:
     """Wet stretches of all lengths, as wet as the step at their front tells: not linear."""
-    scanned, consist = scene.scanned, windows.consist
-    for peak in _peaks(scene, 2 * _PEAKS, _APART_M):
+    scanned, consist = residual_scan.fault_scan, windows.consist
+    for peak in _peaks(residual_scan, 2 * _PEAKS, _APART_M):
         place = float(scanned.place_m[peak])
         run = windows.run_at(place)
         rho = float(scanned.resistance_ohm[peak]) / (2 * consist.runs[run].cable.impedance_ohm)
@@ -206,33 +229,33 @@ def _either_side(windows: Windows, run: int, inside_m: float) -> Iterator[tuple[
         yield run + 1, _BEYOND_M
 
 
-def _peaks(scene: Scene, count: int, apart_m: float) -> list[int]:
+def _peaks(residual_scan: ResidualScan, count: int, apart_m: float) -> list[int]:
     """Largest peaks of all, and the largest of the part that a healthy train leaves open."""
-    found = scene.scanned.peaks(count, apart_m)
-    if scene.last_m > 0:
-        late = scene.scanned.peaks(1, apart_m, scene.last_m)
-        found += [peak for peak in late if peak not in found]
-    return found
+    peaks = residual_scan.fault_scan.peaks(count, apart_m)
+    if residual_scan.last_m > 0:
+        late = residual_scan.fault_scan.peaks(1, apart_m, residual_scan.last_m)
+        peaks += [peak for peak in late if peak not in peaks]
+    return peaks
 
 
-def _stretches(windows: Windows, scene: Scene) -> list[tuple[float, float]]:
+def _stretches(windows: Windows, residual_scan: ResidualScan) -> list[tuple[float, float]]:
     """Stretches around the two largest peaks, wider where the line blurs them."""
-    found = []
-    for peak in _peaks(scene, _PEAKS, _APART_FAR_M):
-        place = float(scene.scanned.place_m[peak])
+    stretches = []
+    for peak in _peaks(residual_scan, _PEAKS, _APART_FAR_M):
+        place = float(residual_scan.fault_scan.place_m[peak])
         blur = blur_m(windows, place)
-        found.append((max(0.0, place - AHEAD_M - blur), place + _BEHIND_M + 0.3 * blur))
-    return found
+        stretches.append((max(0.0, place - AHEAD_M - blur), place + _BEHIND_M + 0.3 * blur))
+    return stretches
 
 
-def _runs(windows: Windows, scene: Scene) -> list[int]:
+def _runs(windows: Windows, residual_scan: ResidualScan) -> list[int]:
     """Runs that could be of another cable: around the largest peak, and the most suspicious."""
-    reached = min(windows.cars, scene.runs + 1)
-    if not scene.is_started:
+    reached = min(windows.cars, residual_scan.runs + 1)
+    if not residual_scan.is_started:
         return list(range(reached))
-    found = {int(k) for k in np.argsort(scene.scanned.run_statistic)[::-1][:2]}
-    for low, high in _stretches(windows, scene)[:1]:
-        found |= set(range(windows.run_at(low + 6.0), windows.run_at(high - 8.0) + 1))
-    if scene.last_m > 0:
-        found |= set(range(windows.run_at(scene.last_m + AHEAD_M - 1.0), reached))
-    return sorted(run for run in found if run < reached)
+    runs = {int(k) for k in np.argsort(residual_scan.fault_scan.run_statistic)[::-1][:2]}
+    for low, high in _stretches(windows, residual_scan)[:1]:
+        runs |= set(range(windows.run_at(low + 6.0), windows.run_at(high - 8.0) + 1))
+    if residual_scan.last_m > 0:
+        runs |= set(range(windows.run_at(residual_scan.last_m + AHEAD_M - 1.0), reached))
+    return sorted(run for run in runs if run < reached)

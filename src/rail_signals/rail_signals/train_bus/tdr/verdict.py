@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rail_signals.train_bus.bus_line import BusLine, CableSection, Coupler, Termination
 from rail_signals.train_bus.cascade import transfer
 from rail_signals.train_bus.consist import Consist
 from rail_signals.train_bus.faults import BusFault, LooseConnector, MissingShieldGround, WrongCable
-from rail_signals.train_bus.line import Coupler, Line, Section, Termination
 from rail_signals.train_bus.profile import BusProfile
 
 from .hypotheses import as_fault
@@ -134,23 +134,23 @@ def measure_runs(
 ) -> list[RunMeasurement]:
     """Length, impedance and attenuation of every run, from the fit of a train's trace."""
     deviations = interpretation.deviations
-    sections = [e for e in consist.line(deviations).elements if isinstance(e, Section)]
+    sections = [e for e in consist.bus_line(deviations).elements if isinstance(e, CableSection)]
     loss_factor = math.exp(consist.tolerances.loss * deviations.loss)
     fault = interpretation.fit.fault
-    found = []
+    measurements = []
     for car, (section, frequency) in enumerate(zip(sections, frequencies_hz, strict=True)):
         ends = fault is not None and fault.kind in ("open", "short")
         if fault is not None and ends and car > fault.index:
-            found.append(RunMeasurement(None, None, None))
+            measurements.append(RunMeasurement(None, None, None))
         else:
             here = fault if fault is not None and fault.index == car else None
-            found.append(_measure(consist, section, here, loss_factor, frequency))
-    return found
+            measurements.append(_measure(consist, section, here, loss_factor, frequency))
+    return measurements
 
 
 def _measure(
     consist: Consist,
-    section: Section,
+    section: CableSection,
     fault: FaultGuess | None,
     loss_factor: float,
     frequency_hz: float,
@@ -158,10 +158,10 @@ def _measure(
     """One run, with the fault in it."""
     reference = section.cable.impedance_ohm
     stretch, impedance = section.delay_factor, section.impedance_ohm
-    line = Line((section,), Termination(reference))
+    bus_line = BusLine((section,), Termination(reference))
     if fault is None:
         return RunMeasurement(
-            section.length_m * stretch, impedance, _loss_db(line, frequency_hz, reference)
+            section.length_m * stretch, impedance, _loss_db(bus_line, frequency_hz, reference)
         )
     if fault.kind in ("open", "short"):
         return RunMeasurement(float(fault.values[0]) * stretch, impedance, math.inf)
@@ -170,8 +170,8 @@ def _measure(
     if fault.kind in ("wrong_cable", "missing_shield_ground"):
         impedance *= math.exp(fault.values[0])
     if fault.kind == "loose_connector":
-        line = Line((section, Coupler()), Termination(reference))
-    faulty = _in_one_run(as_fault(consist, fault, loss_factor), fault).apply(line)
+        bus_line = BusLine((section, Coupler()), Termination(reference))
+    faulty = _in_one_run(as_fault(consist, fault, loss_factor), fault).apply(bus_line)
     return RunMeasurement(
         section.length_m * stretch, impedance, _loss_db(faulty, frequency_hz, reference)
     )
@@ -186,8 +186,8 @@ def _in_one_run(fault: BusFault, guess: FaultGuess) -> BusFault:
     return replace(fault, place_m=float(guess.values[0]))
 
 
-def _loss_db(line: Line, frequency_hz: float, reference_ohm: float) -> float:
-    passed = abs(transfer(line, [frequency_hz], reference_ohm)[-1, 0])
+def _loss_db(bus_line: BusLine, frequency_hz: float, reference_ohm: float) -> float:
+    passed = abs(transfer(bus_line, [frequency_hz], reference_ohm)[-1, 0])
     return float(-20 * np.log10(passed)) if passed > 0 else math.inf
 
 

@@ -110,7 +110,7 @@ class DiversityLink:
         self._radius = buffer(self._pairs)
         self._direction = buffer(2, self._pairs)
         self._noise = buffer(rx, 2, 2)
-        self._heard, self._symbol, self._found = (
+        self._received, self._symbol, self._estimated = (
             buffer(rx, 2, 2),
             buffer(parts, 2),
             buffer(parts, 2),
@@ -211,26 +211,26 @@ class DiversityLink:
         return as_strided(rows, (rx, parts, 2, 2, 2, n), (r, q, slot, slot, c, b))
 
     def _transmit(self) -> None:
-        heard = self._heard
+        received = self._received
         if self.scheme.transmit == 1:
             if self._moves:
                 for t, matrix in enumerate(self._matrices):
-                    np.einsum("rqcn,qn->rcn", matrix, self._symbol[:, t], out=heard[:, t])
+                    np.einsum("rqcn,qn->rcn", matrix, self._symbol[:, t], out=received[:, t])
             else:
-                np.einsum("rqcn,qtn->rtcn", self._matrices[0], self._symbol, out=heard)
+                np.einsum("rqcn,qtn->rtcn", self._matrices[0], self._symbol, out=received)
         elif self._moves:
             for t, matrix in enumerate(self._matrices):
-                np.einsum("rqmcn,qmn->rcn", matrix[:, :, :, t], self._symbol, out=heard[:, t])
+                np.einsum("rqmcn,qmn->rcn", matrix[:, :, :, t], self._symbol, out=received[:, t])
         else:
-            np.einsum("rqmtcn,qmn->rtcn", self._matrices[0], self._symbol, out=heard)
-        np.add(heard, self._noise, out=heard)
+            np.einsum("rqmtcn,qmn->rtcn", self._matrices[0], self._symbol, out=received)
+        np.add(received, self._noise, out=received)
 
     def _combine(self) -> None:
         form = "rqcn,rtcn->qtn" if self.scheme.transmit == 1 else "rqmtcn,rtcn->qmn"
-        np.einsum(form, self._matrices[0], self._heard, out=self._found)
+        np.einsum(form, self._matrices[0], self._received, out=self._estimated)
 
     def _compare(self) -> tuple[int, int]:
-        np.less(self._found, 0, out=self._decided)
+        np.less(self._estimated, 0, out=self._decided)
         np.not_equal(self._decided, self._sent, out=self._wrong)
         errors = int(np.count_nonzero(self._wrong))
         if not errors:

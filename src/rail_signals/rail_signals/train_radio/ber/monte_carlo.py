@@ -47,7 +47,7 @@ class Result:
 
     @property
     def rate(self) -> float:
-        """Share of wrong bits."""
+        """Fraction of wrong bits."""
         return self.errors / self.bits
 
     def holds(self, rate: float) -> bool:
@@ -91,7 +91,7 @@ def until(
     generator
         Source of all draws: the same seed gives the same result.
     half_width
-        Largest half width of the interval, as a share of the rate.
+        Largest half width of the interval, as a fraction of the rate.
     confidence
         Of the interval, as 0.95 or 0.999.
     min_errors

@@ -1,8 +1,8 @@
 """Plain simulation of code blocks, as the equations are written; also for 16-QAM.
 
-The slow and obvious counterpart of `diversity_link`: complex128, NumPy's own normal deviates,
-one array per symbol of An, Kim and Jeong's eqs 1-9 (corrected: the sign of eq 4, the terms of
-eq 6 and the divisor of eq 9).
+The slow and obvious counterpart of `rail_signals.train_radio.ber.link`: complex128, NumPy's own
+normal deviates, one array per symbol of An, Kim and Jeong's eqs 1-9 (corrected: the sign of eq 4,
+the terms of eq 6 and the divisor of eq 9).
 """
 
 from __future__ import annotations

@@ -101,16 +101,16 @@ def _negative_probability(
     fresh = math.sqrt(1 - rho**2)
     x1, x2 = (other, x) if second else (x, other)
     if scheme.transmit == 1:
-        heard = [[x1, 0, 0, 0, 1, 0], [rho * x2, 0, fresh * x2, 0, 0, 1]]
+        received = [[x1, 0, 0, 0, 1, 0], [rho * x2, 0, fresh * x2, 0, 0, 1]]
         pairs = [(0, 3)] if second else [(0, 2)]
         signs = [1.0]
     else:
         a, b = -np.conj(x2), np.conj(x1)
-        heard = [[x1, x2, 0, 0, 1, 0], [rho * a, rho * b, fresh * a, fresh * b, 0, 1]]
+        received = [[x1, x2, 0, 0, 1, 0], [rho * a, rho * b, fresh * a, fresh * b, 0, 1]]
         # Re(h1* y1 + h2 y2*) for the first symbol, Re(h2* y1 - h1 y2*) for the second.
         pairs = [(1, 2), (0, 3)] if second else [(0, 2), (1, 3)]
         signs = [1.0, -1.0] if second else [1.0, 1.0]
-    mix = np.array([[1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0], *heard], dtype=np.complex128)
+    mix = np.array([[1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0], *received], dtype=np.complex128)
     mix[:, 4:] *= math.sqrt(noise)
     form = np.zeros((4, 4), dtype=np.complex128)
     for (i, k), sign in zip(pairs, signs, strict=True):

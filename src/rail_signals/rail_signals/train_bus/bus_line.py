@@ -1,6 +1,6 @@
 """The parts of a line, from its head to its far end, as data.
 
-A `Line` is a chain of elements - sections of cable, couplers, stubs and lumped elements - that
+A `BusLine` is a chain of elements - sections of cable, couplers, stubs and lumped elements - that
 a termination closes. Nothing is computed here but what each part is: a two-port of a length of
 cable, an impedance in series, an admittance across, or a load.
 """
@@ -19,7 +19,7 @@ from .cable import Cable
 
 
 @dataclass(frozen=True)
-class Section:
+class CableSection:
     """A length of cable.
 
     Parameters
@@ -162,7 +162,7 @@ class Stub:
         Input capacitance beside the load [F].
     """
 
-    section: Section
+    section: CableSection
     load: Termination = Termination()
     capacitance_f: float = 0.0
 
@@ -171,12 +171,12 @@ class Stub:
         _check(self, "capacitance_f")
 
 
-Element: TypeAlias = Section | SeriesElement | ShuntElement | Coupler | Stub
+Element: TypeAlias = CableSection | SeriesElement | ShuntElement | Coupler | Stub
 """Anything a line may be made of."""
 
 
 @dataclass(frozen=True)
-class Line:
+class BusLine:
     """Elements in the order in which a wave from the head meets them, and what ends them."""
 
     elements: tuple[Element, ...]
@@ -189,12 +189,12 @@ class Line:
     @property
     def length_m(self) -> float:
         """Length of the trunk, stubs not counted [m]."""
-        return sum(e.length_m for e in self.elements if isinstance(e, Section))
+        return sum(e.length_m for e in self.elements if isinstance(e, CableSection))
 
     @property
     def delay_s(self) -> float:
         """Time a wave takes from head to end through the cables, without loss [s]."""
-        return sum(e.delay_s for e in self.elements if isinstance(e, Section))
+        return sum(e.delay_s for e in self.elements if isinstance(e, CableSection))
 
 
 def _check(element: object, *names: str) -> None:

@@ -34,7 +34,7 @@ VELOCITY_FACTORS: Final = {"polyethylene": 0.66, "pulp": 0.72, "semi-solid polye
 """Phase velocity over that of light by insulation, as S2 lists them after equation 18."""
 
 TRANSITION_FRACTION: Final = 0.1
-"""Share of the transition time that a stub may delay the wave: the rule of thumb (22)."""
+"""Fraction of the transition time that a stub may delay the wave: the rule of thumb (22)."""
 
 
 def series_impedance(

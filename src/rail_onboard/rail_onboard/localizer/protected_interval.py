@@ -42,7 +42,7 @@ class LocatedFront:
         return (self.low_m, self.high_m) if direction > 0 else (-self.high_m, -self.low_m)
 
 
-def located(row: Sequence[float] | None) -> LocatedFront | None:
+def protected_interval(row: Sequence[float] | None) -> LocatedFront | None:
     """What a row of a localizer says; None if it does not know, or not all.
 
     Parameters

@@ -7,7 +7,7 @@ from math import inf, nan
 import pytest
 
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
-from rail_onboard.localizer.located import located
+from rail_onboard.localizer.protected_interval import protected_interval
 
 ROW = {
     "status": 2.0,
@@ -27,14 +27,14 @@ def row(**changes: float) -> list[float]:
 
 
 def test_interval_and_fastest_speed() -> None:
-    here = located(row())
+    here = protected_interval(row())
     assert here is not None
     assert (here.low_m, here.high_m, here.half_m) == (990.0, 1016.0, 13.0)
     assert (here.fastest_mps, here.doubt_mps, here.believed_mps) == (21.5, 1.5, 20.0)
 
 
 def test_towards_smaller_chainages_the_other_bound_is_the_fastest() -> None:
-    here = located(row(speed_mps=-20.0, speed_low_mps=-22.0, speed_high_mps=-19.0))
+    here = protected_interval(row(speed_mps=-20.0, speed_low_mps=-22.0, speed_high_mps=-19.0))
     assert here is not None
     assert (here.fastest_mps, here.doubt_mps, here.believed_mps) == (22.0, 2.0, 20.0)
     assert here.travelled(1) == (990.0, 1016.0)
@@ -44,14 +44,14 @@ def test_towards_smaller_chainages_the_other_bound_is_the_fastest() -> None:
 @pytest.mark.parametrize("bound", ["low_m", "high_m"])
 @pytest.mark.parametrize("value", [nan, inf, -inf])
 def test_an_interval_without_ends_is_none(bound: str, value: float) -> None:
-    assert located(row(**{bound: value})) is None
+    assert protected_interval(row(**{bound: value})) is None
 
 
 @pytest.mark.parametrize("bound", ["speed_mps", "speed_low_mps", "speed_high_mps"])
 @pytest.mark.parametrize("value", [nan, inf])
 def test_a_speed_that_is_not_known_is_none(bound: str, value: float) -> None:
-    assert located(row(**{bound: value})) is None
+    assert protected_interval(row(**{bound: value})) is None
 
 
 def test_of_nothing_there_is_nothing() -> None:
-    assert located(None) is None
+    assert protected_interval(None) is None

@@ -29,7 +29,7 @@ _IMPEDANCES = (-1.0, -0.7, -0.45, -0.3, -0.2, -0.12, -0.06, 0.0, 0.06, 0.12, 0.2
 _FARTHEST = 0.66
 
 
-class RunSwap:
+class CableSubstitution:
     """Other cables in one run of a fitted train.
 
     Parameters
@@ -82,7 +82,7 @@ class RunSwap:
         return np.asarray(self._scale * (other - self._own) / (self._front + other))
 
 
-def likely_swaps(
+def likely_substitutions(
     model: TraceModel, at: Fit, fields: Fields, projection: Projection, run: int
 ) -> list[tuple[float, float, float]]:
     """Cost, log impedance and log delay of other cables in a run, the best first.
@@ -90,7 +90,7 @@ def likely_swaps(
     The impedance is sought in what comes back before the end of the run can, however fast the
     other cable is, then the delay with the two best.
     """
-    swap = RunSwap(model, at, fields, run)
+    swap = CableSubstitution(model, at, fields, run)
     consist = model.consist
     cable, length = consist.runs[run].cable, consist.runs[run].length_m
     soonest_m = float(consist.starts_m[run]) + length * math.exp(-_FARTHEST)
@@ -108,6 +108,6 @@ def likely_swaps(
     step = max(0.02, spread * cable.velocity_m_per_s / (4 * length))
     delays = np.linspace(-_FARTHEST, _FARTHEST, 2 * math.ceil(_FARTHEST / step) + 1)
     pairs = [(z, float(d)) for z in best for d in delays]
-    found = projection.costs(swap.changes(pairs))
-    order = np.argsort(found)
-    return [(float(found[k]), *pairs[k]) for k in order]
+    ranked = projection.costs(swap.changes(pairs))
+    order = np.argsort(ranked)
+    return [(float(ranked[k]), *pairs[k]) for k in order]

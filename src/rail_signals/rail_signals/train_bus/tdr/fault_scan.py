@@ -2,8 +2,9 @@
 
 At each place of a grid a small resistance and a small inductance are put in series, or a
 stretch of cable from there on is given more capacitance. What they would add to the trace
-(`tdr_model`) is correlated with what the fit has left, the deviations taken out of both
-(`tdr_projection`): the statistic of the generalised likelihood ratio.
+(`rail_signals.train_bus.tdr.model`) is correlated with what the fit has left, the deviations taken
+out of both (`rail_signals.train_bus.tdr.projection`): the statistic of the generalised likelihood
+ratio.
 
 Lumped faults are nearly of this form even if they are large: by the compensation theorem an
 impedance Z put in series acts as ``Z / (1 + Z / Z_loop)`` with ``Z_loop`` about twice the
@@ -38,7 +39,7 @@ WET_LENGTHS_M = (2.0, 4.0, 7.0, 11.0, 16.0)
 
 
 @dataclass(frozen=True)
-class Scan:
+class FaultScan:
     """Statistics along the line.
 
     Parameters
@@ -78,12 +79,12 @@ class Scan:
             Only places from here on [m].
         """
         left = np.where(self.place_m >= low_m, self.statistic, -1.0)
-        found: list[int] = []
-        while len(found) < count and left.size and left.max() > 0:
+        peaks: list[int] = []
+        while len(peaks) < count and left.size and left.max() > 0:
             best = int(np.argmax(left))
-            found.append(best)
+            peaks.append(best)
             left[np.abs(self.place_m - self.place_m[best]) < apart_m] = -1.0
-        return found
+        return peaks
 
 
 def alarm_threshold(consist: Consist, rise_time_s: float, false_alarm_rate: float) -> float:
@@ -103,7 +104,7 @@ def alarm_threshold(consist: Consist, rise_time_s: float, false_alarm_rate: floa
     rise_time_s
         Rise time of the incident edge [s].
     false_alarm_rate
-        Share of healthy trains that may be flagged.
+        Fraction of healthy trains that may be flagged.
 
     Examples
     --------
@@ -125,13 +126,13 @@ def alarm_threshold(consist: Consist, rise_time_s: float, false_alarm_rate: floa
     return threshold
 
 
-def scan(
+def scan_faults(
     model: TraceModel,
     at: Fit,
     fields: Fields,
     projection: Projection,
     high_m: float = np.inf,
-) -> Scan:
+) -> FaultScan:
     """Scan a line for lumped faults, and all its runs for other cable.
 
     Parameters
@@ -149,7 +150,7 @@ def scan(
     inductive = model.grid.to_time(squares * (model.s * NANO)) * unit
     statistic, values = projection.likelihood_ratio(resistive, inductive)
     runs = _run_statistics(model, at, projection)
-    return Scan(places, statistic, values[:, 0], values[:, 1] * NANO, runs)
+    return FaultScan(places, statistic, values[:, 0], values[:, 1] * NANO, runs)
 
 
 def scan_water(
@@ -169,7 +170,7 @@ def scan_water(
     rows = model.grid.to_time(squares * weight) * unit
     total = np.concatenate([np.zeros((1, rows.shape[1])), np.cumsum(rows, axis=0)])
     run = np.searchsorted(model.consist.starts_m, places, "right")
-    found = []
+    peaks = []
     for length in WET_LENGTHS_M:
         count = round(length / step_m)
         if not 0 < count < len(places):
@@ -182,8 +183,8 @@ def scan_water(
         statistic[values[:, 0] <= 0] = 0.0
         best = int(np.argmax(statistic))
         place = float(places[: len(inside)][inside][best]) - step_m / 2
-        found.append((float(statistic[best]), place, length, float(values[best, 0])))
-    return found
+        peaks.append((float(statistic[best]), place, length, float(values[best, 0])))
+    return peaks
 
 
 def _run_statistics(model: TraceModel, at: Fit, projection: Projection) -> FloatArray:

@@ -25,8 +25,8 @@ from .reflectometer import Reflectometer
 
 _STRIDE = 1.7
 _BEYOND_RISES = 2.0
-_MISFIT_SIGMAS = 6.0
-_MISFIT_LEAST = 12.0
+_EXCESS_SIGMAS = 6.0
+_EXCESS_LEAST = 12.0
 _BATCH_DELAYS = np.linspace(-3.6, 3.6, 13)
 
 
@@ -110,11 +110,11 @@ class Windows:
 
     def strides(self, first: int = 0) -> list[int]:
         """Numbers of runs of growing windows, after `first`, up to all."""
-        found, runs = [], first
+        step, runs = [], first
         while runs < self.cars:
             runs = min(self.cars, max(runs + 1, int(runs * _STRIDE)))
-            found.append(runs)
-        return found
+            step.append(runs)
+        return step
 
     def run_at(self, place_m: float) -> int:
         """Number of the run at a place."""
@@ -123,7 +123,7 @@ class Windows:
 
 
 @dataclass(frozen=True)
-class Walk:
+class SequentialFit:
     """How far a train without fault explains a trace.
 
     Parameters
@@ -144,25 +144,25 @@ class Walk:
     failed_runs: int
 
 
-def walk(windows: Windows, trace: FloatArray, sigma: float) -> Walk:
+def fit_sequentially(windows: Windows, trace: FloatArray, sigma: float) -> SequentialFit:
     """Fit growing windows until one is wrong, and then run by run to the first that is."""
     deviations = first_guess(windows, trace, sigma)
     windows.forget(1)
     healthy: Fit | None = None
     done = 0
     for runs in windows.strides():
-        found = _next(windows, trace, sigma, runs, healthy, deviations)
-        if not _is_wrong(healthy, found):
-            healthy, done = found, runs
+        step = _next(windows, trace, sigma, runs, healthy, deviations)
+        if not _is_wrong(healthy, step):
+            healthy, done = step, runs
             continue
         for single in range(done + 1, runs):
             closer = _next(windows, trace, sigma, single, healthy, deviations)
             if _is_wrong(healthy, closer):
-                return Walk(healthy, done, closer, single)
+                return SequentialFit(healthy, done, closer, single)
             healthy, done = closer, single
-        found = _next(windows, trace, sigma, runs, healthy, deviations)
-        return Walk(healthy, done, found, runs)
-    return Walk(healthy, done, None, done)
+        step = _next(windows, trace, sigma, runs, healthy, deviations)
+        return SequentialFit(healthy, done, step, runs)
+    return SequentialFit(healthy, done, None, done)
 
 
 def first_guess(windows: Windows, trace: FloatArray, sigma: float) -> FloatArray:
@@ -189,13 +189,13 @@ def _next(
     healthy: Fit | None,
     start: FloatArray,
 ) -> Fit:
-    begin = start if healthy is None else healthy.deviations
-    return windows.fit(trace, sigma, runs, begin, steps=4)
+    first = start if healthy is None else healthy.deviations
+    return windows.fit(trace, sigma, runs, first, steps=4)
 
 
 def _is_wrong(before: Fit | None, now: Fit) -> bool:
     """Whether what a window adds is more than noise and tolerances can be."""
     cost, samples = (0.0, 0) if before is None else (before.cost, before.samples)
     added = now.samples - samples
-    limit = max(_MISFIT_SIGMAS * math.sqrt(2 * max(added, 1)), 0.0) + _MISFIT_LEAST
+    limit = max(_EXCESS_SIGMAS * math.sqrt(2 * max(added, 1)), 0.0) + _EXCESS_LEAST
     return now.cost - cost - added > limit

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rail_signals.arrays import FloatArray
+from rail_signals.train_bus.bus_line import Coupler, Termination
 from rail_signals.train_bus.consist import COMMON, CarRun, Consist, Tolerances
-from rail_signals.train_bus.line import Coupler, Termination
 from rail_signals.train_bus.profile import BusProfile
 
 from .fit import Fit
@@ -25,10 +25,10 @@ from .interpretation import Finding, Interpretation, interpret
 from .parts import FaultGuess
 from .projection import Projection
 from .reflectometer import Reflectogram, Reflectometer
-from .scene import scene_of
+from .residual_scan import scan_residual
+from .sequential_fit import SequentialFit, Windows
 from .traces import summarise
 from .verdict import RunMeasurement, RunVerdict, judge, measure_runs
-from .walk import Walk, Windows
 
 ENDS = ("open", "short", "matched")
 """What a run may end in."""
@@ -51,7 +51,7 @@ _FAR_OFF = 2e-3
 
 
 @dataclass(frozen=True)
-class RunReading:
+class CableReading:
     """What a reflectogram of one run says.
 
     Parameters
@@ -72,9 +72,9 @@ class RunReading:
     consist: Consist
 
 
-def read_run(
+def read_single_cable(
     reflectogram: Reflectogram, profile: BusProfile, instrument: Reflectometer
-) -> RunReading:
+) -> CableReading:
     """Read the reflectogram of one run of cable.
 
     Parameters
@@ -98,23 +98,23 @@ def read_run(
     readings = []
     for end, length, load in ends:
         consist = _one_run(profile, length, Termination(load))
-        found = interpret(reflectogram, consist, instrument)
-        stretch = math.exp(_TOLERANCES.delay * float(found.deviations.delay[0]))
+        interpretation = interpret(reflectogram, consist, instrument)
+        stretch = math.exp(_TOLERANCES.delay * float(interpretation.deviations.delay[0]))
         if end == "matched" and abs(stretch - 1) > _FAR_OFF:
             # Places are told along a run of the length that was found, not of the first guess.
             length *= stretch
             consist = _one_run(profile, length, Termination(load))
-            found = interpret(reflectogram, consist, instrument)
-        readings.append((end, length, consist, found))
+            interpretation = interpret(reflectogram, consist, instrument)
+        readings.append((end, length, consist, interpretation))
     # What explains the trace, and of two that do, that which needs no fault beside.
-    end, length, consist, found = min(readings, key=lambda reading: _cost(reading[3]))
-    measured = measure_runs(found, consist, [profile.attenuation_frequency_hz])[0]
-    if end == "matched" and _length_std_m(found.fit, length) > _KNOWN_M:
+    end, length, consist, interpretation = min(readings, key=lambda reading: _cost(reading[3]))
+    measured = measure_runs(interpretation, consist, [profile.attenuation_frequency_hz])[0]
+    if end == "matched" and _length_std_m(interpretation.fit, length) > _KNOWN_M:
         measured = RunMeasurement(None, measured.impedance_ohm, None)
     verdict = judge(measured, profile)
-    if found.finding is not None:
-        verdict = _with_finding(verdict, found.finding)
-    return RunReading(end, found, verdict, consist)
+    if interpretation.finding is not None:
+        verdict = _with_finding(verdict, interpretation.finding)
+    return CableReading(end, interpretation, verdict, consist)
 
 
 def _cost(reading: Interpretation) -> float:
@@ -125,26 +125,26 @@ def _find_end(
     trace: FloatArray, sigma: float, start_s: float, profile: BusProfile, instrument: Reflectometer
 ) -> FaultGuess | None:
     """The open or short that a cable without end would need to explain the trace."""
-    reach = _reach_m(len(trace), start_s, profile, instrument)
-    consist = _one_run(profile, reach, Termination(profile.termination_ohm))
+    observable_m = _observable_length_m(len(trace), start_s, profile, instrument)
+    consist = _one_run(profile, observable_m, Termination(profile.termination_ohm))
     windows = Windows(consist, instrument, len(trace), start_s)
     drawn = np.zeros(COMMON + 3)
     healthy = windows.fit(trace, sigma, 1, drawn, steps=8)
     unfitted = windows.fit(trace, sigma, 1, drawn, steps=0)
-    scene = scene_of(windows, trace, sigma, Walk(unfitted, 0, None, 1))
+    residual_scan = scan_residual(windows, trace, sigma, SequentialFit(unfitted, 0, None, 1))
     loop = 2 * profile.cable.impedance_ohm
-    found: list[Fit] = []
-    for peak in scene.scanned.peaks(_PEAKS, 3.0):
-        rho = float(scene.scanned.resistance_ohm[peak]) / loop
+    interpretation: list[Fit] = []
+    for peak in residual_scan.fault_scan.peaks(_PEAKS, 3.0):
+        rho = float(residual_scan.fault_scan.resistance_ohm[peak]) / loop
         if abs(rho) < _END_REFLECTS:
             continue
-        place = float(scene.scanned.place_m[peak])
+        place = float(residual_scan.fault_scan.place_m[peak])
         values = [place] if rho > 0 else [place, 1.0]
         guess = FaultGuess("open" if rho > 0 else "short", 0, np.array(values))
-        found.append(windows.fit(trace, sigma, 1, drawn, guess, steps=15))
-    if not found:
+        interpretation.append(windows.fit(trace, sigma, 1, drawn, guess, steps=15))
+    if not interpretation:
         return None
-    best = min(found, key=lambda fit: fit.cost)
+    best = min(interpretation, key=lambda fit: fit.cost)
     return best.fault if best.cost < healthy.cost - _LEAST_GAIN else None
 
 
@@ -178,7 +178,9 @@ def _one_run(profile: BusProfile, length_m: float, load: Termination) -> Consist
     return Consist((run,), None, Coupler(), load, _TOLERANCES)
 
 
-def _reach_m(samples: int, start_s: float, profile: BusProfile, instrument: Reflectometer) -> float:
+def _observable_length_m(
+    samples: int, start_s: float, profile: BusProfile, instrument: Reflectometer
+) -> float:
     """A length whose end the record does not reach any more [m]."""
     end = start_s + samples * instrument.sample_period_s
     return 0.5 * end * profile.cable.velocity_m_per_s + 1.0

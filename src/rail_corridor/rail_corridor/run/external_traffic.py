@@ -28,12 +28,12 @@ _POLL_S: Final = 0.1
 _SETTLED_POLLS: Final = 5
 
 
-class Bystander(CorridorNode):
+class ExternalTrafficRecorder(CorridorNode):
     """Hears the nodes of others.
 
     Parameters
     ----------
-    strangers : iterable of str
+    external_nodes : iterable of str
         Full names of their nodes.
     open_sink : callable of kind of topic and name
         Opens what takes the messages of a topic.
@@ -43,7 +43,7 @@ class Bystander(CorridorNode):
 
     def __init__(
         self,
-        strangers: Iterable[str],
+        external_nodes: Iterable[str],
         open_sink: Callable[[Topic, str], Sink],
         shared: Iterable[Topic],
         *,
@@ -51,8 +51,8 @@ class Bystander(CorridorNode):
     ) -> None:
         super().__init__(NAME, "/", context=context, services=False)
         self._open_sink = open_sink
-        self._heard: set[str] = set(_OF_ROS)
-        self._polls = dict.fromkeys(strangers, 0)
+        self._known_topics: set[str] = set(_OF_ROS)
+        self._polls = dict.fromkeys(external_nodes, 0)
         self._present: set[str] = set()
         for topic in shared:
             self._hear(topic, topic.name())
@@ -62,30 +62,34 @@ class Bystander(CorridorNode):
 
     def _poll(self) -> None:
         """Look for topics of the nodes that have said that they are ready."""
-        for stranger in [name for name in self._polls if name in self._present]:
-            namespace, _, name = stranger.rpartition("/")
-            found = self.get_publisher_names_and_types_by_node(name, namespace or "/")
-            new = [(topic, types[0]) for topic, types in found if topic not in self._heard]
+        for external_node in [name for name in self._polls if name in self._present]:
+            namespace, _, name = external_node.rpartition("/")
+            published = self.get_publisher_names_and_types_by_node(name, namespace or "/")
+            new = [
+                (topic, types[0]) for topic, types in published if topic not in self._known_topics
+            ]
             for topic, kind in new:
                 self._hear_named(topic, kind)
-            self._polls[stranger] = 0 if new else self._polls[stranger] + 1
-            if self._polls[stranger] >= _SETTLED_POLLS:
-                del self._polls[stranger]
+            self._polls[external_node] = 0 if new else self._polls[external_node] + 1
+            if self._polls[external_node] >= _SETTLED_POLLS:
+                del self._polls[external_node]
         if not self._polls:
             self._poll_timer.cancel()
 
     def _hear_named(self, name: str, kind: str) -> None:
-        self._heard.add(name)
+        self._known_topics.add(name)
         if name.endswith("/transition_event"):
             return
         known = kind_of(name)
         try:
             message_definition(kind)
-            found = known or Topic(name, message_class(kind), self._offer(name), None, "", "", "")
+            known_topic = known or Topic(
+                name, message_class(kind), self._offer(name), None, "", "", ""
+            )
         except LookupError as error:
             self.report(DiagnosticStatus.WARN, name, f"not recorded: {error}")
             return
-        self._hear(found, name)
+        self._hear(known_topic, name)
 
     def _offer(self, name: str) -> QoSProfile:
         """Profile that the first publisher of a topic offers."""
@@ -94,7 +98,7 @@ class Bystander(CorridorNode):
 
     def _hear(self, topic: Topic, name: str) -> None:
         sink = self._open_sink(topic, name)
-        self._heard.add(name)
+        self._known_topics.add(name)
         everything = QoSProfile(
             history=HistoryPolicy.KEEP_ALL,
             reliability=topic.qos.reliability,

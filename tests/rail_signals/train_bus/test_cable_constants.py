@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rail_signals.train_bus import line_constants as cc
+from rail_signals.train_bus import cable_constants as cc
 
 OMEGA = 2 * math.pi * 1e6
 

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from axle_counter import quantities
 from axle_counter.signals.axle_detector import AxleDetector, Passages
 from axle_counter.signals.wheel_sensor import WheelSensor
 from axle_counter.topics import COILS, PASSAGES
 from rail_msgs_py.decoders import samples
-from rail_msgs_py.parameters import parameter
 from rail_msgs_py.tick_node import EquipmentNode
 
-_SENSOR = WheelSensor()
 _OFF = Passages(0, 0, 0, busy=False, valid=False)
 
 
@@ -26,24 +25,12 @@ _OFF = Passages(0, 0, 0, busy=False, valid=False)
 class DetectionPointParameters:
     """Parameters of a detection point."""
 
-    coil_spacing_m: float = parameter(
-        _SENSOR.coil_spacing_m, "between the coils", unit="m", low=0.01, high=1.0
-    )
-    pulse_m: float = parameter(
-        _SENSOR.pulse_m, "travel over which a wheel damps a coil", unit="m", low=0.01, high=1.0
-    )
-    rest_v: float = parameter(
-        _SENSOR.rest_v, "amplitude of an undamped coil", unit="V", low=1e-3, high=1e3
-    )
-    depth_v: float = parameter(
-        _SENSOR.depth_v, "what a wheel takes from it", unit="V", low=1e-3, high=1e3
-    )
-    threshold: float = parameter(
-        _SENSOR.threshold, "fraction of the depth that switches a coil on", low=0.01, high=0.99
-    )
-    release: float = parameter(
-        _SENSOR.release, "fraction of the depth that switches it off again", low=0.01, high=0.99
-    )
+    coil_spacing_m: float = quantities.COIL_SPACING.parameter()
+    pulse_m: float = quantities.PULSE.parameter()
+    rest_v: float = quantities.REST.parameter()
+    depth_v: float = quantities.DEPTH.parameter()
+    threshold: float = quantities.THRESHOLD.parameter()
+    release: float = quantities.RELEASE.parameter()
 
 
 class DetectionPointNode(

@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from axle_counter import quantities
 from axle_counter.signals.axle_detector import Passages
 from axle_counter.signals.section_counter import Occupancy, Reset, Section, SectionCounter
 from axle_counter.topics import PASSAGES, RESET, SECTIONS
 from rail_msgs_py.decoders import table_row
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.parameters import ParameterError, parameter
+from rail_msgs_py.quantities import GIVE_UP
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.tick import DONE
 
@@ -32,15 +34,13 @@ class EvaluatorParameters:
     border_inward: tuple[int, ...] = parameter(
         (), "+1 where axles pass the point forward to enter, else -1", low=-1, high=1
     )
-    reset: str = parameter("sweep", "what a reset makes of a section: sweep, conditional")
+    reset: str = quantities.RESET.parameter()
     reset_sections: tuple[str, ...] = parameter((), "sections that are reset at a known time")
     reset_times_s: tuple[float, ...] = parameter((), "when each of them is", unit="s", low=0.0)
     empty_at_start: tuple[str, ...] = parameter(
         (), "sections seen to be empty when the run begins; in service in its first tick"
     )
-    timeout_s: float = parameter(
-        2.0, "wall time after which a point is given up", unit="s", low=0.05, high=3600.0
-    )
+    timeout_s: float = GIVE_UP.parameter()
 
 
 class AxleEvaluatorNode(
@@ -65,8 +65,6 @@ class AxleEvaluatorNode(
 
     def _read_sections(self) -> list[Section]:
         p = self._p
-        if p.reset not in {how.value for how in Reset}:
-            raise ParameterError(f"reset: {p.reset}: is neither sweep nor conditional")
         for group in ("border_points", "border_inward"):
             if len(getattr(p, group)) != len(p.border_sections):
                 raise ParameterError(f"{group}: does not go with border_sections")

@@ -6,9 +6,10 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from axle_counter import quantities
 from axle_counter.signals.axles import Cars
 from axle_counter.signals.wheel_sensor import WheelSensor
-from rail_world.line.description_base import Chainage, Description, Name, StrictFloat
+from rail_world.line.description_base import Chainage, Description, Name, StrictFloat, field_of
 
 
 class SensorPlace(Description):
@@ -20,14 +21,14 @@ class SensorPlace(Description):
 
 
 class MissedAxlesAct(Description):
-    """A loose sensor: every so manieth axle of a train damps it by ``left`` of what it should."""
+    """A loose sensor: of every so many axles of a train one damps it by ``left`` of its due."""
 
     kind: Literal["missed_axles"] = "missed_axles"
     point: Name
     from_s: StrictFloat
     to_s: StrictFloat
-    every: int = Field(ge=1)
-    left: StrictFloat = Field(ge=0.0, le=1.0)
+    every: int = field_of(quantities.EVERY)
+    left: StrictFloat = field_of(quantities.LEFT)
 
 
 class RailBrakeAct(Description):
@@ -37,7 +38,7 @@ class RailBrakeAct(Description):
     train: Name
     from_s: StrictFloat
     to_s: StrictFloat
-    length_m: StrictFloat = Field(gt=0.0)
+    length_m: StrictFloat = field_of(quantities.MAGNET_LENGTH)
 
 
 class WheelSensorDescription(Description):
@@ -46,8 +47,8 @@ class WheelSensorDescription(Description):
     sensor: WheelSensor
     places: tuple[SensorPlace, ...] = Field(min_length=1)
     cars: Cars
-    sample_rate_hz: StrictFloat = Field(gt=0.0)
-    noise_v: StrictFloat = Field(ge=0.0)
+    sample_rate_hz: StrictFloat = field_of(quantities.SAMPLE_RATE)
+    noise_v: StrictFloat = field_of(quantities.NOISE)
     missed_axles: tuple[MissedAxlesAct, ...] = ()
     rail_brakes: tuple[RailBrakeAct, ...] = ()
 

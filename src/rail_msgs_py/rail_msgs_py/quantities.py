@@ -9,6 +9,8 @@ from .quantity import NEEDED, Quantity
 TICK: Final = Quantity(0.1, "time of one tick", unit="s", low=0.01, high=1.0)
 SEED: Final = Quantity(1, "seed of every random draw", low=0, high=2**63 - 1)
 
+END_WHEN_ARRIVED: Final = Quantity(False, "whether to end earlier, once every train has arrived")
+
 FAULT_BEGIN: Final = Quantity(0.0, "start", unit="s", low=0.0, high=1e6)
 FAULT_END: Final = Quantity(1e6, "end", unit="s", low=0.0, high=1e6)
 SLIP_RATIO: Final = Quantity(

@@ -21,7 +21,7 @@ from rail_msgs_py.failures import WATCH_PERIOD_S, FailureWatch
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.quantities import CAB_SIGNALS, GIVE_UP
+from rail_msgs_py.quantities import CAB_SIGNALS, END_WHEN_ARRIVED, GIVE_UP
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
 from rail_msgs_py.table import values_from_cdr
 from rail_msgs_py.tap import raw_publish
@@ -59,7 +59,7 @@ class WorldParameters:
     nodes: tuple[str, ...] = parameter((), "full names of the nodes that must be ready first")
     sinks: tuple[str, ...] = parameter((), "full names of the nodes whose `done` ends a tick")
     clock_readers: int = parameter(0, "readers of the clock that must be connected first", low=0)
-    end_when_arrived: bool = parameter(False, "whether to end once every train has arrived")
+    end_when_arrived: bool = END_WHEN_ARRIVED.parameter()
     supervised: tuple[str, ...] = parameter((), "trains that wait for a command in every tick")
     odometers: tuple[str, ...] = parameter((), "trains whose wheels are listened to")
     supervision: str = parameter(

@@ -11,7 +11,7 @@ from typing import Any, Final, Generic, TypeVar, cast
 from pydantic import Field, SerializeAsAny, model_validator
 from typing_extensions import Self
 
-from rail_msgs_py.quantities import SEED, TICK
+from rail_msgs_py.quantities import END_WHEN_ARRIVED, SEED, TICK
 from rail_world.line.description import JunctionDescription, TrackDescription
 from rail_world.line.description_base import Description, Name, StrictFloat, field_of
 from rail_world.line.network import Network, build_network
@@ -37,9 +37,7 @@ class Scenario(Description):
     description: str = Field(default="", max_length=1000, description="one line about it")
     seed: StrictInt = field_of(SEED)
     duration_s: StrictFloat = Field(gt=0.0, le=1e5, description="simulated time [s]")
-    end_when_arrived: bool = Field(
-        default=False, description="end earlier, when every train has arrived"
-    )
+    end_when_arrived: bool = field_of(END_WHEN_ARRIVED)
     tick_s: StrictFloat = field_of(TICK)
     tracks: dict[Name, TrackDescription] = Field(max_length=100, description="tracks by name")
     junctions: tuple[JunctionDescription, ...] = Field(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, Literal, get_args
 
 from rail_msgs_py.quantity import NEEDED, Quantity
 
@@ -30,6 +30,10 @@ REFLECTOMETER_NOISE: Final = Quantity(
     1e-3, "rms of a sample of a trace, as a reflection", low=0.0, high=0.1, low_open=True
 )
 
+GrowthLaw = Literal["linear", "exponential"]
+GROWTH_LAW: Final[Quantity[GrowthLaw]] = Quantity(
+    "exponential", "law of growth", choices=get_args(GrowthLaw)
+)
 FAULT_SIZE: Final = Quantity(
     NEEDED, "when it has grown, in the unit of its kind", low=0.0, high=1e6, low_open=True
 )

@@ -33,7 +33,7 @@ class BusFaultDescription(Description):
     fault: FaultKind
     from_s: Annotated[StrictFloat, range_of(FAULT_BEGIN)]
     to_s: Annotated[StrictFloat, range_of(FAULT_END)]
-    law: Literal["linear", "exponential"]
+    law: Annotated[quantities.GrowthLaw, range_of(quantities.GROWTH_LAW)]
     size: Annotated[StrictFloat, range_of(quantities.FAULT_SIZE)]
     at_m: Annotated[StrictFloat, range_of(quantities.FAULT_PLACE)]
     length_m: Annotated[StrictFloat, range_of(quantities.WET_LENGTH)]
@@ -49,7 +49,7 @@ class TrainBus(Description):
     """The bus of one train: the profile of each of its cars, and what is wrong with it."""
 
     train: Name
-    cars: tuple[str, ...] = Field(min_length=1, max_length=100)
+    cars: Annotated[tuple[str, ...], range_of(quantities.CARS)]
     fault: BusFaultDescription | None = None
 
 

@@ -77,7 +77,7 @@ class BusFault(Fault):
     fault: FaultKind = Field(description="what it is; open and wrong_cable do not grow")
     from_s: StrictFloat = field_of(FAULT_BEGIN)
     to_s: StrictFloat = field_of(FAULT_END.but(default=NEEDED, text="it is as large as it gets"))
-    law: Literal["linear", "exponential"] = Field(default="exponential", description="of growth")
+    law: quantities.GrowthLaw = field_of(quantities.GROWTH_LAW)
     size: Annotated[StrictFloat, range_of(quantities.FAULT_SIZE)] | None = Field(
         default=None,
         description="when it has grown: resistance of loose_connector and bad_splice, and what is"

@@ -20,7 +20,7 @@ from pydantic.fields import FieldInfo
 
 import rail_msgs_py
 from rail_corridor.cli.topic_docs import parameters_of
-from rail_corridor.equipment.registry import node_kinds, subsystems
+from rail_corridor.equipment.registry import BUILTIN, node_kinds, subsystems
 from rail_corridor.errors import InputError
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.loading.schema import models_of, parse_scenario, scenario_model
@@ -236,7 +236,7 @@ def test_the_trace_finds_what_is_handed_over_under_another_name(handed_over: Any
 
 def test_every_section_is_in_the_scenarios_that_are_traced() -> None:
     scenarios = [load_scenario(name) for name in SCENARIOS]
-    for subsystem in subsystems():
+    for subsystem in BUILTIN:
         for section in subsystem.sections:
             assert any(section.of(scenario) is not None for scenario in scenarios), section.name
     kinds = {fault.kind for scenario in scenarios for fault in scenario.faults}

@@ -11,7 +11,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from rail_msgs_py.parameters import descriptor, parameter
 from rail_msgs_py.quantity import NEEDED, Quantity, quantity_of
-from rail_world.line.description_base import Number, field_of, quantity_of_field, range_of
+from rail_world.line.description_base import StrictFloat, field_of, quantity_of_field, range_of
 
 SPEED = Quantity(36.0, "speed", unit="km/h", low=0.0, high=360.0)
 LEVEL = Quantity(4.0, "level", unit="V", low=0.0, high=100.0, low_open=True)
@@ -52,7 +52,7 @@ def test_a_value_is_within_the_bounds_or_refused(
 def test_a_description_draws_the_same_line(
     quantity: Quantity[Any], value: Any, possible: bool
 ) -> None:
-    kind = tuple[Annotated[Number, range_of(quantity)], ...]
+    kind = tuple[Annotated[StrictFloat, range_of(quantity)], ...]
     adapter: TypeAdapter[Any] = TypeAdapter(kind)
     values = value if isinstance(value, tuple) else (value,)
     if possible:
@@ -80,10 +80,10 @@ def test_a_derived_quantity_follows_its_source() -> None:
 
 def test_a_field_of_a_section_has_default_bounds_and_description() -> None:
     class Section(BaseModel):
-        speed_kmh: Number = field_of(SPEED)
-        speeds_kmh: tuple[Annotated[Number, range_of(SPEEDS)], ...] = field_of(SPEEDS)
-        place_m: Number = field_of(PLACE)
-        other_m: Annotated[Number, range_of(PLACE)] | None = None
+        speed_kmh: StrictFloat = field_of(SPEED)
+        speeds_kmh: tuple[Annotated[StrictFloat, range_of(SPEEDS)], ...] = field_of(SPEEDS)
+        place_m: StrictFloat = field_of(PLACE)
+        other_m: Annotated[StrictFloat, range_of(PLACE)] | None = None
 
     section = Section(place_m=3.0)
     assert (section.speed_kmh, section.speeds_kmh, section.other_m) == (36.0, (36.0,), None)
@@ -100,7 +100,7 @@ def test_a_field_of_a_section_has_default_bounds_and_description() -> None:
 
 def test_what_is_always_given_has_no_default() -> None:
     class Given(BaseModel):
-        level_v: Annotated[Number, range_of(LEVEL)]
+        level_v: Annotated[StrictFloat, range_of(LEVEL)]
         alone: float = 1.0
 
     with pytest.raises(ValidationError, match="Field required"):

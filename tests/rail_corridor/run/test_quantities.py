@@ -230,7 +230,7 @@ def test_the_trace_finds_what_is_handed_over_under_another_name(handed_over: Any
         "train_bus_monitor.noise_rms",
         "BusDescription.reflectometer_noise",
     }
-    assert ends["Jam.power_dbm"] == {"Fault.power_dbm"}
+    assert ends["Jam.power_dbm"] == {"RadioFault.power_dbm"}
     assert len(ends) > 70
 
 

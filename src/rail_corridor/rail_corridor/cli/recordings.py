@@ -41,11 +41,12 @@ def replay(
         float, typer.Option("--rate", help="Simulated seconds per second.", metavar="R")
     ] = 1.0,
     start: Annotated[
-        float, typer.Option("--start", help="Begin at this simulated time [s].", metavar="S")
+        float,
+        typer.Option("--start", help="Start at this simulated time, in s.", metavar="S"),
     ] = 0.0,
     duration: Annotated[
         float | None,
-        typer.Option("--duration", help="Simulated time to publish [s].", metavar="S"),
+        typer.Option("--duration", help="Simulated time to publish, in seconds.", metavar="S"),
     ] = None,
     topics: Annotated[
         list[str] | None,

@@ -122,7 +122,7 @@ def accuracy(
     ] = None,
     speed: Annotated[
         list[float] | None,
-        typer.Option("--speed", help="Speed [km/h]; repeatable.", metavar="KMH"),
+        typer.Option("--speed", help="Speed in km/h; repeatable.", metavar="KMH"),
     ] = None,
     out: Annotated[
         Path, typer.Option("--out", help="Figure: .png, .svg or .pdf.", metavar="FILE")

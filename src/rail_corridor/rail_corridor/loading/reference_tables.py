@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
@@ -34,10 +34,19 @@ def _table(model: type[BaseModel]) -> str:
         quantity = quantity_of_field(field)
         if quantity is not None and quantity.choices:
             meaning += f"; one of {', '.join(map(str, quantity.choices))}"
+        elif choices := _choices(field.annotation):
+            meaning += f": {choices}"
         if bounds := _bounds(field.metadata):
             meaning += f"; {bounds}"
         rows.append(f"| `{name}` | {_default(model, field)} | {meaning} |")
     return "\n".join(rows)
+
+
+def _choices(annotation: Any) -> str:
+    """Values of a field that takes one of a few."""
+    if get_origin(annotation) is not Literal:
+        return ""
+    return ", ".join(f"`{value}`" for value in get_args(annotation))
 
 
 def _default(model: type[BaseModel], field: Any) -> str:

@@ -22,7 +22,7 @@ from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.safe_result import Accepted
 from rail_msgs_py.train_radio.telegrams import Telegrams
 from rail_msgs_py.train_radio.train_channel import controller_end
-from rail_msgs_py.train_radio.train_report import LocationReport
+from rail_msgs_py.train_radio.train_report import WIDEST_M, LocationReport
 from rail_onboard.train_radio.atp_node import AtpNode
 
 TRAIN, NAME = "first", "/first/atp"
@@ -267,6 +267,32 @@ def test_with_a_localizer_it_is_where_that_says_or_stops(graph: Any, given: Any)
     assert lost["service_brake"] == 1.0
     assert math.isnan(last(train.state)["front_m"])
     assert train.tick([train.authority()], place=(1250.0, 1254.0))["service_brake"] == 0.0
+
+
+def test_an_emergency_stop_stops_a_train_with_track_ahead(graph: Any, given: Any) -> None:
+    train = Protection(graph, given)
+    train.tick()
+    train.hears()
+    train.greet()
+    run = train.tick([train.authority(2000.0)], speed_mps=5.0)
+    assert run["emergency_brake"] == 0.0
+    stopped = train.tick([train.authority(2000.0, emergency_stop=True)], way_m=1.0, speed_mps=5.0)
+    assert run["permitted_mps"] > 15.0 and stopped["permitted_mps"] <= 5.0
+    assert (stopped["service_brake"], stopped["emergency_brake"]) == (1.0, 1.0)
+
+
+def test_a_place_too_wide_for_a_report_is_reported_as_not_known(graph: Any, given: Any) -> None:
+    train = Protection(graph, given, localizer=True)
+    train.tick(place=(1250.0, 1254.0))
+    train.hears()
+    for _ in range(4):
+        train.tick([train.authority()], place=(1250.0, 1254.0))
+        train.hears()
+    for half_m, valid in ((WIDEST_M - 0.5, True), (WIDEST_M + 0.5, False)):
+        train.tick([train.authority()], place=(8000.0 - half_m, 8000.0 + half_m))
+        report = train.hears()
+        assert report is not None and report.position_valid is valid
+        assert report.uncertainty_m == pytest.approx(min(half_m, WIDEST_M), abs=0.1)
 
 
 @pytest.mark.parametrize(

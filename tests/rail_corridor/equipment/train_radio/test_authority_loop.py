@@ -140,4 +140,20 @@ def test_a_fix_moves_the_location() -> None:
     for _ in range(2):
         corridor.step()
     front_m, half_m = corridor.trains[1].state_values((corridor.tick - 1) * TICK_NS)[3:5]
-    assert abs(front_m - 1000.4) <= half_m < 2.0
+    # Four standard deviations and what they do not see, 1.5 m; rounded up in the telegram.
+    assert abs(front_m - 1000.4) <= 0.01
+    assert 4.0 * 0.01 + 1.5 <= half_m <= 1.65
+
+
+def test_a_range_of_no_known_variance_moves_nothing() -> None:
+    corridor, untold = Corridor(placed_m=5.0), Corridor(placed_m=5.0)
+    for _ in range(4):
+        corridor.step()
+        untold.step()
+    for variance_m2 in (np.inf, np.nan):
+        corridor.desk.ranged(1, 1.0, 0, 1000.4, variance_m2)
+        corridor.step()
+        untold.step()
+    now_ns = (corridor.tick - 1) * TICK_NS
+    assert corridor.trains[1].state_values(now_ns) == untold.trains[1].state_values(now_ns)
+    assert not corridor.desk.troubles(1)

@@ -24,6 +24,7 @@ from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.world import STATE
 
 Install = Callable[..., Subsystem]
+UNREAD = "what it declares cannot be read"
 
 
 class _Entry:
@@ -33,7 +34,7 @@ class _Entry:
         self.name, self.value, self._loaded = name, value, loaded
 
     def load(self) -> Any:
-        if isinstance(self._loaded, Exception):
+        if isinstance(self._loaded, BaseException):
             raise self._loaded
         return self._loaded
 
@@ -106,9 +107,25 @@ def test_a_subsystem_of_another_distribution_comes_last(install: Install) -> Non
         ({"nodes": (NodeKind("wrs", "a:B"),)}, "kind of node wrs belongs to ranging"),
         ({"nodes": (NodeKind("world", "a:B"),)}, "kind of node world belongs to the corridor"),
         ({"topics": (topic("/world/state"),)}, "topic /world/state belongs to the corridor"),
+        (
+            {"topics": (topic("/wayside/{a}/{b}/range"),)},
+            "topic /wayside/{}/{}/range belongs to ranging",
+        ),
+        ({"sections": (Section("extra", None, ""),) * 2}, "section extra is declared twice"),
+        ({"topics": (topic("/{a}/own"), topic("/{b}/own"))}, "topic /{}/own is declared twice"),
+        ({"faults": (Fault,)}, f"{UNREAD}: ValueError: Fault has no kind: Literal[...]"),
+        (
+            {"faults": (int,)},
+            f"{UNREAD}: AttributeError: type object 'int' has no attribute 'model_fields'",
+        ),
+        ({"nodes": None}, f"{UNREAD}: TypeError: 'NoneType' object is not iterable"),
+        (
+            {"sections": ("extra",)},
+            f"{UNREAD}: AttributeError: 'str' object has no attribute 'name'",
+        ),
     ],
 )
-def test_a_name_that_is_taken_is_refused(
+def test_a_declaration_that_is_wrong_or_taken_is_refused(
     install: Install, fields: dict[str, Any], line: str
 ) -> None:
     install(**fields)
@@ -122,6 +139,7 @@ def test_a_name_that_is_taken_is_refused(
     ("loaded", "line"),
     [
         (ImportError("no module extra"), "cannot be loaded: ImportError: no module extra"),
+        (SystemExit(7), "cannot be loaded: SystemExit: 7"),
         (Subsystem, "is not a Subsystem"),  # the class instead of an instance
     ],
 )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib.metadata import entry_points
+from re import sub
 from typing import Final, get_args
 
 from rail_corridor.equipment.doppler.subsystem import DOPPLER
@@ -39,55 +40,76 @@ def subsystems() -> tuple[Subsystem, ...]:
     Raises
     ------
     InputError
-        If one of another distribution cannot be loaded, or takes a name that is taken.
+        If one of another distribution cannot be loaded, declares what is none of the kinds above,
+        or takes a name that is taken.
     """
     found: list[Subsystem] = list(BUILTIN)
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
         try:
             extra = entry.load()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             reason = f"cannot be loaded: {type(error).__name__}: {error}"
             raise InputError(reason, field=GROUP, value=entry.value) from None
         if not isinstance(extra, Subsystem):
             raise InputError("is not a Subsystem", field=GROUP, value=entry.value)
-        _refuse_twins(found, extra, entry.value)
+        try:
+            mine = names_of(extra)
+        except Exception as error:
+            reason = f"what it declares cannot be read: {type(error).__name__}: {error}"
+            raise InputError(reason, field=GROUP, value=entry.value) from None
+        _refuse_twins(found, mine, entry.value)
         found.append(extra)
     return tuple(found)
 
 
-def _refuse_twins(found: list[Subsystem], extra: Subsystem, where: str) -> None:
+def _refuse_twins(found: list[Subsystem], mine: dict[str, list[str]], where: str) -> None:
     taken = [("the corridor", _OWN), *((other.name, names_of(other)) for other in found)]
-    mine = names_of(extra)
-    for owner, names in taken:
-        for what in mine:
-            for twin in sorted(mine[what] & names[what]):
+    for what, names in mine.items():
+        for owner, theirs in taken:
+            for twin in sorted({*names}.intersection(theirs[what])):
                 raise InputError(f"{what} {twin} belongs to {owner}", field=GROUP, value=where)
+        for twin in sorted(name for name in {*names} if names.count(name) > 1):
+            raise InputError(f"{what} {twin} is declared twice", field=GROUP, value=where)
 
 
-def names_of(subsystem: Subsystem) -> dict[str, set[str]]:
-    """Every name that a subsystem takes, by what it names."""
+def names_of(subsystem: Subsystem) -> dict[str, list[str]]:
+    """Every name that a subsystem takes, by what it names; of a topic its shape.
+
+    Raises
+    ------
+    AttributeError, TypeError, ValueError
+        If something that it declares is not of the kind it should be.
+    """
     return {
-        "name": {subsystem.name},
-        "section": {section.name for section in subsystem.sections},
-        "kind of fault": {_kind_of_fault(fault) for fault in subsystem.faults},
-        "option": {option.option for option in subsystem.options},
-        "kind of node": {kind.name for kind in subsystem.nodes},
-        "topic": {topic.pattern for topic in subsystem.topics},
+        "name": [subsystem.name],
+        "section": [section.name for section in subsystem.sections],
+        "kind of fault": [_kind_of_fault(fault) for fault in subsystem.faults],
+        "option": [option.option for option in subsystem.options],
+        "kind of node": [kind.name for kind in subsystem.nodes],
+        "topic": [_shape(topic) for topic in subsystem.topics],
     }
 
 
 def _kind_of_fault(fault: type[Fault]) -> str:
-    return str(get_args(fault.model_fields["kind"].annotation)[0])
+    kinds = get_args(fault.model_fields["kind"].annotation)
+    if not kinds:
+        raise ValueError(f"{fault.__name__} has no kind: Literal[...]")
+    return str(kinds[0])
+
+
+def _shape(topic: Topic) -> str:
+    """Of two patterns that differ in names of placeholders only, every name would match both."""
+    return sub(r"\{\w+\}", "{}", topic.pattern)
 
 
 #: Names that are the corridor's own.
-_OWN: Final[dict[str, set[str]]] = {
-    "name": set(),
-    "section": set(Scenario.model_fields),
-    "kind of fault": {_kind_of_fault(fault) for fault in (TrainStopFault, WheelSlipFault)},
-    "option": set(),
-    "kind of node": {WORLD.name},
-    "topic": {topic.pattern for topic in (*tick.TOPICS, *world.TOPICS)},
+_OWN: Final[dict[str, list[str]]] = {
+    "name": [],
+    "section": [*Scenario.model_fields],
+    "kind of fault": [_kind_of_fault(fault) for fault in (TrainStopFault, WheelSlipFault)],
+    "option": [],
+    "kind of node": [WORLD.name],
+    "topic": [_shape(topic) for topic in (*tick.TOPICS, *world.TOPICS)],
 }
 
 

@@ -48,12 +48,17 @@ def test_a_signal_ends_everything_and_leaves_a_report(
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_nothing_outlives_the_launcher(
-    rail: Rail, wait_until: Callable[[Callable[[], Any]], Any], number: signal.Signals
+    rail: Rail,
+    listener: Listener,
+    wait_until: Callable[[Callable[[], Any]], Any],
+    number: signal.Signals,
 ) -> None:
     recording = rail.directory / "run.mcap"
+    observed = listener.listen(OBSERVED)
     run = rail.start("run", "branch", "--rate", 5, "--processes", "site", "--record", recording)
     wait_until(lambda: len(rail.processes()) >= 15 and len(rail.segments()) >= 14)
-    wait_until(lambda: recording.stat().st_size > 500_000)
+    # A recording has the ticks of its report, so that must have read some before it ends.
+    listener.until(lambda: len(observed) > 1 and recording.stat().st_size > 500_000)
     segments = rail.segments()
     run.send_signal(number)
     run.wait()

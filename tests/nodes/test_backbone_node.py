@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray, Header
 
@@ -15,7 +14,6 @@ from rail_corridor.equipment.train_radio.placement import bases_of
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.plan.plan import make_plan
-from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.stamps import clock_to_cdr, to_ns
 from rail_msgs_py.table import Table
 from rail_msgs_py.topics.tick import CLOCK, DONE
@@ -171,11 +169,3 @@ def test_what_it_does_depends_on_the_seed_alone(graph: Any, tmp_path: Path) -> N
         up = same.up(tick * TICK_NS, {BASES[0]: [(1, FIRST)]})
         assert list(batch.frames) == up[BASES[0]]
         same.down(tick * TICK_NS, {BASES[0]: [(1, SECOND)]})
-
-
-def test_a_world_without_train_radio_is_one_line(graph: Any, tmp_path: Path) -> None:
-    make_plan(load_scenario("plain_line"), tmp_path)
-    given = {"world_file": str(tmp_path / "world.json")}
-    with pytest.raises(ParameterError, match="describes no train_radio") as caught:
-        BackboneNode(context=graph.context, parameters=given, services=False)
-    assert "\n" not in str(caught.value)

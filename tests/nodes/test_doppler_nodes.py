@@ -335,14 +335,6 @@ def test_switched_off_it_knows_nothing_and_on_again_it_begins_anew(graph: Any, p
 # What cannot be --------------------------------------------------------------------------
 
 
-def test_a_world_without_references_is_one_line(graph: Any, tmp_path: Path) -> None:
-    make_plan(load_scenario("plain_line"), tmp_path)
-    given = {"world_file": str(tmp_path / "world.json")}
-    with pytest.raises(ParameterError, match="describes no doppler") as caught:
-        ReferenceMediumNode(context=graph.context, parameters=given, services=False)
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize(
     ("kind", "wrong", "line"),
     [

@@ -331,9 +331,3 @@ def test_what_is_no_trace_is_not_interpreted(graph: Any) -> None:
 def test_wrong_parameters_are_one_line(graph: Any, kind: Any, wrong: Any, line: str) -> None:
     with pytest.raises(ParameterError, match=line):
         kind(context=graph.context, parameters=wrong)
-
-
-def test_a_world_without_a_bus_is_refused(graph: Any, tmp_path: Path) -> None:
-    given = parameters(make_plan(load_scenario("plain_line"), tmp_path), "/world/radio_medium")
-    with pytest.raises(ParameterError, match="describes no train_bus"):
-        BusMediumNode(context=graph.context, parameters=given)

@@ -461,14 +461,6 @@ def test_who_sends_nothing_is_named_and_the_tick_goes_on(graph: Any, plan: Plan)
     assert len(graph.failed) == 2
 
 
-def test_a_world_without_train_radio_is_one_line(graph: Any, tmp_path: Path) -> None:
-    make_plan(load_scenario("plain_line"), tmp_path)
-    given = {"world_file": str(tmp_path / "world.json")}
-    with pytest.raises(ParameterError, match="describes no train_radio") as caught:
-        CbtcMediumNode(context=graph.context, parameters=given, services=False)
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize(
     ("kind", "wrong", "line"),
     [

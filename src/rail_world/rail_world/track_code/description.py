@@ -15,7 +15,6 @@ from rail_world.line.description_base import (
     Name,
     StrictFloat,
     range_of,
-    whole_samples,
 )
 
 Decibels = Annotated[StrictFloat, Field(ge=0.0, le=200.0)]
@@ -106,16 +105,6 @@ class RailDescription(Description):
     def track_order(self) -> tuple[str, ...]:
         """Names of the tracks in the order that counts them."""
         return self.tracks or tuple(dict.fromkeys(circuit.track for circuit in self.circuits))
-
-    def samples(self, tick_s: float) -> int:
-        """Samples in a tick of ``tick_s``.
-
-        Raises
-        ------
-        ValueError
-            If that is not a whole number above zero.
-        """
-        return whole_samples(self.sample_rate_hz, tick_s)
 
     @model_validator(mode="after")
     def _agrees(self) -> RailDescription:

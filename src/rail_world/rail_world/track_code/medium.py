@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from rail_signals.arrays import BoolArray, FloatArray
+from rail_world.line.description_base import whole_samples
 
 from .description import RailDescription
 from .noise import RealNoiseSource
@@ -121,7 +122,7 @@ class RailMedium:
 
     def __init__(self, description: RailDescription, seed: int, tick_s: float = 0.1) -> None:
         self.description = description
-        self.samples = samples = description.samples(tick_s)
+        self.samples = samples = whole_samples(description.sample_rate_hz, tick_s)
         circuits = description.circuits
         tracks = {name: index for index, name in enumerate(description.track_order)}
         track = np.array([tracks[circuit.track] for circuit in circuits], dtype=np.intp)

@@ -18,7 +18,6 @@ from rail_world.line.description_base import (
     Name,
     StrictFloat,
     range_of,
-    whole_samples,
 )
 from rail_world.ranging.description import Channel, Vector
 
@@ -135,16 +134,6 @@ class CbtcDescription(Description):
     def track_order(self) -> tuple[str, ...]:
         """Names of the tracks in the order that counts them."""
         return self.tracks or tuple(dict.fromkeys(mast.track for mast in self.base_stations))
-
-    def samples(self, tick_s: float) -> int:
-        """Samples in a tick of ``tick_s``.
-
-        Raises
-        ------
-        ValueError
-            If that is not a whole number above zero.
-        """
-        return whole_samples(self.sample_rate_hz, tick_s)
 
     @model_validator(mode="after")
     def _agrees(self) -> CbtcDescription:

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_signals.arrays import FloatArray
+from rail_world.line.description_base import whole_samples
 from rail_world.ranging.medium import THERMAL_NOISE_DBM_PER_HZ
 from rail_world.ranging.noise import NoiseSource
 
@@ -99,7 +100,7 @@ class CbtcMedium:
 
     def __init__(self, description: CbtcDescription, seed: int, tick_s: float = 0.1) -> None:
         self.description = description
-        self.samples = description.samples(tick_s)
+        self.samples = whole_samples(description.sample_rate_hz, tick_s)
         self._seed = seed
         self._geometry = LinkGeometry(description, tick_s)
         self._channel = [mast.channel for mast in description.base_stations]

@@ -47,7 +47,13 @@ def make_nodes(specs: Sequence[NodeSpec], context: Any, *, switches: bool = Fals
     return nodes
 
 
-def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None, *, switches: bool = False) -> None:
+def run_nodes(
+    specs: Sequence[NodeSpec],
+    tap: Tap | None = None,
+    *,
+    switches: bool = False,
+    report_reads: frozenset[str] = frozenset(),
+) -> None:
     """Make nodes in this process and spin them until SIGTERM.
 
     Parameters
@@ -57,6 +63,9 @@ def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None, *, switches: bo
         Is told of everything that they publish.
     switches : bool
         As of `make_nodes`.
+    report_reads : frozenset of str
+        Names of the topics that a report in another process reads: its ear must be open before
+        their nodes are ready.
     """
     import rclpy
     from rclpy.signals import SignalHandlerOptions
@@ -64,6 +73,7 @@ def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None, *, switches: bo
     from rail_msgs_py.standalone import spin
 
     context = make_context(tap)
+    context.report_reads = report_reads
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     nodes = make_nodes(specs, context, switches=switches)
     try:

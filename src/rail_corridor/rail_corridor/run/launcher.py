@@ -23,6 +23,7 @@ from rail_corridor.middleware.domain import sole_corridor
 from rail_corridor.plan.plan import REPORT, WORLD, Placement, Plan, check_external, make_plan
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
+from rail_corridor.report.intake import names_read
 from rail_corridor.report.report import make_report, print_report, report_text, write_report
 from rail_corridor.scenario.model import Scenario
 
@@ -129,6 +130,7 @@ class _LaunchedRun:
         if placement != "one":
             self._here.clear()
         check_kills(options.kills, self._groups, WORLD, one=bool(self._here))
+        self._report_reads = names_read(plan)
         self._recording: RunRecording | None = None
         self._recording_failed = False
         self._signal = 0
@@ -176,7 +178,7 @@ class _LaunchedRun:
     def _child(self, name: str, specs: list[NodeSpec]) -> None:
         """In a process of its own: run nodes, and tell the recorder what they publish."""
         tap = self._recording.tap_of(name) if self._recording else None
-        run_nodes(specs, tap, switches=self._options.switches)
+        run_nodes(specs, tap, switches=self._options.switches, report_reads=self._report_reads)
 
     def _record(self, path: Path, nodes: int) -> RunRecording:
         """Start the recorder, before any other process and before ROS."""
@@ -209,6 +211,8 @@ class _LaunchedRun:
 
         tap = self._recording.start() if self._recording else None
         context = make_context(tap)
+        if self._options.only == "onboard":  # the report that reads it is on the other host
+            context.report_reads = self._report_reads
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
         self._stop = Future()
         self._observer = Observer(

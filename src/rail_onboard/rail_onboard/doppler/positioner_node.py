@@ -103,6 +103,7 @@ class DopplerPositionerNode(
         block = None if silent_ns is not None else Waveform.from_cdr(raw)
         stamp_ns = block.stamp_ns if block is not None else silent_ns
         assert stamp_ns is not None
+        self.at_tick(stamp_ns)
         step_s = 0.0 if self._last_ns is None else (stamp_ns - self._last_ns) / NANOSECONDS
         self._last_ns = stamp_ns
         positioner = self._positioner

@@ -63,6 +63,7 @@ class TrackCodeReceiverNode(
 
     def _on_block(self, raw: bytes) -> None:
         block = Waveform.from_cdr(raw)
+        self.at_tick(block.stamp_ns)
         values = self._values[0]
         values[:] = 0.0
         if self.switched_on and not block.silent:

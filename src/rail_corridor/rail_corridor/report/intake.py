@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticStatus
-
 from rclpy.serialization import deserialize_message
 
 from rail_corridor.plan.plan import Plan
@@ -57,9 +56,7 @@ class Reader:
 
 def names_read(plan: Plan) -> frozenset[str]:
     """Names of the topics that a report reads, other than those that are kept for it."""
-    ports = (
-        spec.topic.name(**parts) for spec in plan.records for _, parts, _ in spec.ports()
-    )
+    ports = (spec.topic.name(**parts) for spec in plan.records for _, parts, _ in spec.ports())
     return frozenset((DIAGNOSTICS.name(), *ports))
 
 

@@ -6,7 +6,8 @@ import gc
 import os
 import signal
 import threading
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rail_corridor.equipment.node_spec import NodeSpec
@@ -34,14 +35,25 @@ def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:
     return node
 
 
-def make_nodes(specs: Sequence[NodeSpec], context: Any, *, switches: bool = False) -> list[Any]:
+def make_nodes(
+    specs: Sequence[NodeSpec],
+    context: Any,
+    *,
+    switches: bool = False,
+    until: Callable[[], bool] = lambda: False,
+) -> list[Any]:
     """Create the nodes of one process; many of them go without services.
 
-    With ``switches`` they keep those that switch equipment off and on.
+    With ``switches`` they keep those that switch equipment off and on. Once ``until`` says so
+    no more are made.
     What is there by then stays: no need to look through it for garbage again.
     """
     services: Any = len(specs) <= MOST_NODES_WITH_SERVICES or (switches and "switches")
-    nodes = [make_node(spec, context, services) for spec in specs]
+    nodes = []
+    for spec in specs:
+        if until():
+            break
+        nodes.append(make_node(spec, context, services))
     gc.collect()
     gc.freeze()
     return nodes
@@ -82,6 +94,20 @@ def run_nodes(
         for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown(context=context)
+
+
+def destroy_nodes(nodes: Iterable[Any], within_s: float) -> bool:
+    """Destroy nodes, as many as can be in a time; whether that was all of them.
+
+    The middleware looks for the counterparts of each publisher and subscription among all those of
+    the process: some thousands of them take several seconds.
+    """
+    deadline_s = time.monotonic() + within_s
+    for node in nodes:
+        if time.monotonic() > deadline_s:
+            return False
+        node.destroy_node()
+    return True
 
 
 def make_context(tap: Tap | None) -> Any:

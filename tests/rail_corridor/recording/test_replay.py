@@ -55,9 +55,8 @@ def test_a_part_begins_with_what_was_latched_before(run: Any) -> None:
     out = published(run, start_s=3.55, duration_s=1.0)
     before = [m for m in out if m.log_time_ns < 3_550_000_000]
     after = out[len(before) :]
-    # Health of 0.7 and 2.7 s, and the failure of 3.0 s; no estimate, no clock of then.
-    assert {m.channel.topic for m in before} == {"/diagnostics", "/failed"}
-    assert len(before) == 6
+    # The failure of 3.0 s; no estimate, no clock of then, nor health, which is repeated.
+    assert [m.channel.topic for m in before] == ["/failed"] * 2
     times = [m.log_time_ns for m in after]
     assert times == sorted(times)
     assert [m.log_time_ns for m in after if m.channel.topic == "/clock"] == [
@@ -66,9 +65,9 @@ def test_a_part_begins_with_what_was_latched_before(run: Any) -> None:
 
 
 def test_at_an_instant_what_is_latched_is_first(run: Any) -> None:
-    out = [m.channel.topic for m in published(run, start_s=4.7, duration_s=0.05)]
+    out = [m.channel.topic for m in published(run, start_s=3.0, duration_s=0.05)]
     now = out[-7:]
-    assert now[:2] == ["/diagnostics"] * 2
+    assert now[:2] == ["/failed"] * 2
     assert {*now[2:]} == {
         "/clock",
         "/world/state",
@@ -94,7 +93,7 @@ def test_profiles_are_those_of_the_run(run: Any) -> None:
         assert offer.profile.depth == kind.qos.depth
         assert offer.profile.durability == kind.qos.durability
     assert {name for name, offer in offers.items() if offer.latched} == {
-        *("/diagnostics", "/failed", "/world/finished")
+        *("/failed", "/world/finished")
     }
 
 

@@ -153,7 +153,9 @@ class _LaunchedRun:
         #: Whether some nodes of this process could not be destroyed in time: it must not tidy up.
         self.nodes_left = False
         ours = {spec.name for specs in self._groups.values() for spec in specs}
-        self._others = {spec.name for spec in plan.nodes} - ours - {*options.external}
+        # Of the wayside the world, without which nothing goes on.
+        others = {spec.name for spec in plan.nodes} - ours - {*options.external}
+        self._others = others & {WORLD} or others
         self._half_seen = self._half_gone = False
         self._looked_s = 0.0
         self._observer: Any = None
@@ -365,7 +367,7 @@ class _LaunchedRun:
         names = [
             f"{space.rstrip('/')}/{n}" for n, space in observer.get_node_names_and_namespaces()
         ]
-        if names.count(REPORT) > 1 or not self._others.isdisjoint(names):
+        if not self._others.isdisjoint(names):
             self._half_seen = True
         elif self._half_seen and not self._half_gone:
             self._half_gone = True

@@ -14,16 +14,16 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from rail_msgs_py.topics.tick import DIAGNOSTICS, READY
 from rail_msgs_py.topics.topic import Topic
 
+from .delivery import Decoder, LocalDelivery, LocalReader, Send, view_reader
 from .parameters import overrides
+from .publisher import CorridorPublisher
 from .stamps import to_time
 from .table import TableWriter
-from .tap import raw_publish, tapped
 
 READY_POLL_S = 0.05
 #: Which services a node offers beside its topics: all, none, or the lifecycle's alone.
@@ -68,16 +68,25 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         self._ready_publisher: Any = None
         self._ready_timer: Any = None
 
-    def publisher(self, topic: Topic, **parts: object) -> Any:
+    @property
+    def _delivery(self) -> LocalDelivery | None:
+        """Delivery to the other nodes of the process, if it has one."""
+        return getattr(self.context, "delivery", None)
+
+    def publisher(self, topic: Topic, **parts: object) -> CorridorPublisher:
         """Publisher of a topic of the table."""
         publisher = self.create_publisher(topic.type, topic.name(**parts), topic.qos)
-        return tapped(self.context, topic, publisher)
+        tap = getattr(self.context, "tap", None)
+        return CorridorPublisher(topic, publisher, tap, self._delivery)
 
-    def stream_out(self, topic: Topic, **parts: object) -> Callable[[bytes], None]:
-        """Function that publishes serialised messages to a reader that the tick waits for."""
+    def stream_out(self, topic: Topic, **parts: object) -> Send:
+        """Function that sends messages to a reader that the tick waits for.
+
+        It takes a view, such as `Waveform`, or a serialised message.
+        """
         publisher = self.publisher(topic, **parts)
         self._connections.append(lambda: publisher.get_subscription_count() > 0)
-        return raw_publish(publisher)
+        return publisher.send
 
     def table_out(
         self, topic: Topic, rows: Iterable[str], *, awaited: bool = False, **parts: object
@@ -101,9 +110,7 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
             The values must be C-contiguous.
         """
         publish = (
-            self.stream_out(topic, **parts)
-            if awaited
-            else raw_publish(self.publisher(topic, **parts))
+            self.stream_out(topic, **parts) if awaited else self.publisher(topic, **parts).send
         )
         write = TableWriter(tuple(rows), topic.columns).write
 
@@ -114,30 +121,77 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
 
     def stream_in(self, topic: Topic, callback: Callable[[bytes], None], **parts: object) -> None:
         """Subscribe to serialised messages of a topic of the table."""
-        name = topic.name(**parts)
-        self._subscribe(topic.type, name, callback, topic.qos, raw=True)
-        self._connections.append(lambda: self.count_publishers(name) > 0)
+        self._read_stream(topic, callback, None, parts)
+
+    def blocks_in(
+        self,
+        topic: Topic,
+        decode: Decoder[Any],
+        callback: Callable[[int, Any], None],
+        **parts: object,
+    ) -> None:
+        """Subscribe to a topic of the table; the callback takes stamp [ns] and item.
+
+        What a node of the same process sends is not serialised on the way.
+        """
+
+        def take_raw(raw: bytes) -> None:
+            callback(*decode(raw))
+
+        of_view = view_reader(decode)
+        take_view = None
+        if of_view is not None:
+            read = of_view
+
+            def take_view(view: Any) -> None:
+                callback(*read(view))
+
+        self._read_stream(topic, take_raw, take_view, parts)
+
+    def _read_stream(
+        self,
+        topic: Topic,
+        take_raw: Callable[[bytes], None],
+        take_view: Callable[[Any], None] | None,
+        parts: Mapping[str, object],
+    ) -> None:
+        name, delivery = topic.name(**parts), self._delivery
+
+        def subscribe() -> None:
+            self.create_subscription(topic.type, name, self.guarded(take_raw), topic.qos, raw=True)
+
+        if delivery is None:
+            subscribe()
+            self._connections.append(lambda: self.count_publishers(name) > 0)
+            return
+        safely = self._safely
+        reader = LocalReader(
+            self, safely(take_raw), None if take_view is None else safely(take_view)
+        )
+        line = delivery.read(name, reader, subscribe)
+        self._connections.append(lambda: line.writers > 0 or self.count_publishers(name) > 0)
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         """Subscribe to messages of a topic that nothing waits for."""
-        self._subscribe(topic.type, topic.name(**parts), callback, topic.qos, raw=False)
-
-    def _subscribe(
-        self,
-        kind: Any,
-        name: str,
-        callback: Callable[[Any], None],
-        qos: QoSProfile,
-        *,
-        raw: bool,
-    ) -> None:
-        self.create_subscription(kind, name, self.guarded(callback), qos, raw=raw)
+        self.create_subscription(topic.type, topic.name(**parts), self.guarded(callback), topic.qos)
 
     def guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
-        """Callback whose exceptions are told on ``/diagnostics`` instead of stopping the process.
+        """Callback for the executor; what it sends within the process is handed over after it.
 
-        The tick's timeout then treats the node as silent, as it would a broken device.
+        Exceptions are told on ``/diagnostics`` instead of stopping the process. The tick's timeout
+        then treats the node as silent, as it would a broken device.
         """
+        safe, delivery = self._safely(callback), self._delivery
+        if delivery is None:
+            return safe
+
+        def run(*arguments: Any) -> None:
+            safe(*arguments)
+            delivery.run()
+
+        return run
+
+    def _safely(self, callback: Callable[..., None]) -> Callable[..., None]:
 
         def run(*arguments: Any) -> None:
             try:

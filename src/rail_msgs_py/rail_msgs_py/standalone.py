@@ -41,6 +41,9 @@ def spin(context: Any, nodes: Iterable[Any], until: Future | None = None) -> int
 
     for node in nodes:
         executor.add_node(node)
+    delivery = getattr(context, "delivery", None)
+    if delivery is not None:
+        delivery.settle(executor)
     try:
         with signals_to(on_signal):
             executor.spin_until_future_complete(stop, timeout_sec=FOREVER_S)

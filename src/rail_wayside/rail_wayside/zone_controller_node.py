@@ -108,7 +108,7 @@ class ZoneControllerNode(
         p = self._p
         zone_map = zone_map_of(p)
         self._tracker = ZoneTracker(zone_map, list(zip(p.trains, p.entry_zones, strict=True)))
-        self._positions = {name: self.publisher(POSITION, train=name).publish for name in p.trains}
+        self._positions = {name: self.publisher(POSITION, train=name).send for name in p.trains}
         self._writers: dict[tuple[str, str], PositionWriter] = {}
         # In the order of their names, so that sums over them are repeatable.
         self._zone_ports = {

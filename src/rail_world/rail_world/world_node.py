@@ -24,7 +24,6 @@ from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.quantities import CAB_SIGNALS, END_WHEN_ARRIVED, GIVE_UP
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
 from rail_msgs_py.table import values_from_cdr
-from rail_msgs_py.tap import raw_publish
 from rail_msgs_py.tick_node import TickNode
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.topics.tick import CLOCK, DONE, FAILED, FINISHED, OBSERVED, READY
@@ -90,9 +89,9 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._finished = False
         names = self._traffic.names
         self._clock_publisher = self.publisher(CLOCK)
-        self._begin_tick = raw_publish(self._clock_publisher)
+        self._begin_tick = self._clock_publisher.send
         self._state = self.table_out(STATE, names)
-        self._truth = [self.publisher(TRUTH, train=name).publish for name in names]
+        self._truth = [self.publisher(TRUTH, train=name).send for name in names]
         self._truth_writers: dict[tuple[str, str], PositionWriter] = {}
         self._finish = self.publisher(FINISHED)
         self._supervisors = {

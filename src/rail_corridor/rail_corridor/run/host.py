@@ -74,13 +74,11 @@ def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None, *, switches: bo
         rclpy.try_shutdown(context=context)
 
 
-def make_context(tap: Tap | None) -> Any:
-    """Context of the nodes of a process."""
-    import rclpy
+def make_context(tap: Tap | None, *, alone: bool = False) -> Any:
+    """Context of the nodes of a process; ``alone`` as of `LocalDelivery`."""
+    from rail_msgs_py.context import CorridorContext
 
-    from rail_msgs_py.tap import TappedContext
-
-    return rclpy.Context() if tap is None else TappedContext(tap)
+    return CorridorContext(tap, alone=alone)
 
 
 def die_with(lifeline: int) -> None:

@@ -208,7 +208,8 @@ class _LaunchedRun:
         from rail_msgs_py.standalone import FOREVER_S
 
         tap = self._recording.start() if self._recording else None
-        context = make_context(tap)
+        alone = bool(self._here) and not self._options.with_external_nodes
+        context = make_context(tap, alone=alone)
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
         self._stop = Future()
         self._observer = Observer(
@@ -228,6 +229,7 @@ class _LaunchedRun:
         executor = EventsExecutor(context=context)
         for node in nodes:
             executor.add_node(node)
+        context.delivery.settle(executor)
         self._arrange_kills(executor, nodes)
         with Progress(
             TextColumn("{task.description}"),
@@ -265,6 +267,7 @@ class _LaunchedRun:
                 return
             # Not destroyed before the end: what is under way to it would find no handle.
             executor.remove_node(here[name])
+            observer.context.delivery.remove(here[name])
             observer.announce_failure(name, "killed")
 
         injector = FaultInjector(kills, kill)

@@ -13,7 +13,7 @@ import numpy as np
 
 from rail_msgs_py.tick_inputs import TickInputs
 from rail_msgs_py.topics.ranging import LINKS, VRS_RX, VRS_TX, WRS_RX, WRS_TX
-from rail_msgs_py.waveform import BlockReader, RepeatedBlock, Waveform, silence
+from rail_msgs_py.waveform import BlockReader, RepeatedBlock, Waveform, WaveformView, silence
 from rail_world.medium_node import MediumNode, MediumParameters
 
 from .description import RadioDescription
@@ -39,7 +39,7 @@ class RadioMediumNode(MediumNode[RadioMediumParameters], name="radio_medium", na
         downlink = TickInputs(self, self._on_downlink, self._p.timeout_s, then=self.inputs)
         self._state = self.state_port(downlink, len(radio.trains))
         self._station_ports = [
-            downlink.port(WRS_TX, BlockReader().read, site=antenna.site, zone=antenna.zone)
+            downlink.port(WRS_TX, BlockReader().decoder(), site=antenna.site, zone=antenna.zone)
             for antenna in radio.stations
         ]
         self._station_out = [
@@ -47,7 +47,7 @@ class RadioMediumNode(MediumNode[RadioMediumParameters], name="radio_medium", na
             for antenna in radio.stations
         ]
         self._train_ports = [
-            self.inputs.port(VRS_TX, BlockReader().read, train=train) for train in radio.trains
+            self.inputs.port(VRS_TX, BlockReader().decoder(), train=train) for train in radio.trains
         ]
         self._train_out = {
             (index, channel): self.stream_out(VRS_RX, train=train, channel=channel)
@@ -106,12 +106,12 @@ class RadioMediumNode(MediumNode[RadioMediumParameters], name="radio_medium", na
                 links[train, 1] = up.snr
         return links
 
-    def _block(self, stamp_ns: int, channel: int, reception: Reception | None) -> bytes:
+    def _block(self, stamp_ns: int, channel: int, reception: Reception | None) -> WaveformView:
         if reception is None:
             return self._silence[channel].at(stamp_ns)
         rate_hz, carrier_hz = self._radio.sample_rate_hz, self._radio.carriers_hz[channel]
         samples = reception.samples[None, :].astype(np.complex128)
-        return Waveform(stamp_ns, rate_hz, carrier_hz, channel, samples).to_cdr()
+        return Waveform(stamp_ns, rate_hz, carrier_hz, channel, samples)
 
 
 def antennas_of(state: Any) -> TrainAntennas:

@@ -129,8 +129,7 @@ class ReferenceMedium:
             if not near:
                 continue
             distance_m = self._distances(state[train], near)
-            total = self._noise.blocks(_STAGE, [train], tick)[0]
-            total *= np.float32(np.sqrt(self.noise_mw))
+            total = self._noise.blocks(_STAGE, [train], tick, np.array([self.noise_mw]))[0]
             for row, station in enumerate(near):
                 offset_hz = shift_hz[station] - self.receiver_hz[train]
                 total += self._arrived(sent[station], station, distance_m[row], offset_hz)

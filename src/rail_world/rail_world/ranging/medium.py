@@ -250,17 +250,19 @@ class RadioMedium:
         for row, port in enumerate(zip(receivers, channel.tolist(), strict=True)):
             arriving.setdefault(port, []).append(row)
         ports = [port[0] * 128 + port[1] for port in arriving]
-        noise = self._noise.blocks(2 if uplink else 1, ports, tick)
-        for (port, rows), total in zip(arriving.items(), noise, strict=True):
-            noise_mw = self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
-            total *= np.float32(np.sqrt(noise_mw))
+        noise_mw = [
+            self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
+            for port in arriving
+        ]
+        noise = self._noise.blocks(2 if uplink else 1, ports, tick, np.array(noise_mw))
+        for (port, rows), total, power in zip(arriving.items(), noise, noise_mw, strict=True):
             for row in rows:
                 total += arrived[row]
             strongest = max(rows, key=lambda row: float(power_mw[row]))
             received[port] = Reception(
                 total,
                 float(power_mw[strongest]),
-                noise_mw,
+                power,
                 (int(s[strongest]), int(t[strongest])),
             )
         return received

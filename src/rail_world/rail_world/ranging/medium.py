@@ -10,7 +10,6 @@ station antenna a link does not exist, in either direction.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,11 +17,11 @@ from numpy.typing import NDArray
 
 from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.delay import repetition, through_paths
-from rail_signals.phasors import cis
+from rail_signals.delay import repetition
 
 from .description import AntennaPattern, RadioDescription
 from .noise import NoiseSource
+from .path_kernels import add_links, delayed_spectra, links_in_coverage
 
 THERMAL_NOISE_DBM_PER_HZ = -173.975  # k T at 290 K
 _MIN_DISTANCE_M = 1.0
@@ -43,7 +42,10 @@ class TrainAntennas:
 
 @dataclass(frozen=True)
 class Paths:
-    """Geometry of one tick between all station and train antennas, arrays [station, train]."""
+    """Geometry of one tick between all station and train antennas, arrays [station, train].
+
+    Out of coverage the gain is -inf, the closing speed 0.
+    """
 
     distance_m: FloatArray
     closing_speed_mps: FloatArray
@@ -104,7 +106,14 @@ class RadioMedium:
         self._positions_m = np.array([a.position_m for a in stations]).reshape(-1, 3)
         boresight = np.array([a.boresight for a in stations]).reshape(-1, 3)
         self._boresight = boresight / np.linalg.norm(boresight, axis=1, keepdims=True)
-        self._coverage_range_m = np.array([a.coverage_range_m for a in stations])
+        coverage_range_m = np.array([a.coverage_range_m for a in stations])
+        self._antennas = np.column_stack((self._positions_m, self._boresight, coverage_range_m))
+        ours, theirs = description.station_pattern, description.train_pattern
+        self._patterns = (
+            ours.gain_dbi + theirs.gain_dbi,
+            *(ours.beamwidth_deg, ours.front_to_back_db),
+            *(theirs.beamwidth_deg, theirs.front_to_back_db),
+        )
         self._downlink = np.array([a.downlink_channel for a in stations], dtype=np.int64)
         self._uplink = np.array([a.uplink_channel for a in stations], dtype=np.int64)
         self._sites = [a.site for a in stations]
@@ -131,32 +140,29 @@ class RadioMedium:
 
     def paths(self, trains: TrainAntennas) -> Paths:
         """Distances, closing speeds and antenna gains of one tick."""
-        line = trains.position_m[None, :, :] - self._positions_m[:, None, :]
-        distance_m = np.maximum(np.sqrt(np.einsum("stk,stk->st", line, line)), _MIN_DISTANCE_M)
-        unit = line / distance_m[..., None]
-        station_cos = np.einsum("stk,sk->st", unit, self._boresight)
         # The train's antenna looks back to the station of its zone.
         heading = trains.heading_rad
         axis = -np.stack((np.cos(heading), np.sin(heading), np.zeros_like(heading)), axis=1)
-        train_cos = -np.einsum("stk,tk->st", unit, axis)
-        radio = self.description
-        gain_db = (
-            pattern_gain_db(radio.station_pattern, station_cos)
-            + pattern_gain_db(radio.train_pattern, train_cos)
-            - 10.0 * radio.path_loss_exponent * np.log10(distance_m)
+        shape = (len(self._sites), len(heading))
+        links, in_coverage = np.empty((3, *shape)), np.empty(shape, dtype=np.bool_)
+        links_in_coverage(
+            self._antennas,
+            np.concatenate((trains.position_m, axis, trains.velocity_mps), axis=1),
+            self._patterns,
+            *(self.description.path_loss_exponent, _MIN_DISTANCE_M),
+            *(links, in_coverage),
         )
-        closing = -np.einsum("stk,tk->st", unit, trains.velocity_mps)
-        in_coverage = distance_m <= self._coverage_range_m[:, None]
-        return Paths(distance_m, closing, gain_db, in_coverage, trains.position_m, axis)
+        return Paths(*links, in_coverage, trains.position_m, axis)
 
     def dead_stations(self, time_s: float) -> set[int]:
         """Indices of station antennas that are dead at ``time_s``."""
-        dead = {
-            fault.station
+        return {
+            index
             for fault in self.description.faults
             if fault.kind == "dead_station" and fault.from_s <= time_s < fault.to_s
+            for index, site in enumerate(self._sites)
+            if site == fault.station
         }
-        return {index for index, site in enumerate(self._sites) if site in dead}
 
     def downlink(
         self, tick: int, time_s: float, paths: Paths, blocks: dict[int, ComplexArray]
@@ -176,8 +182,9 @@ class RadioMedium:
         -------
         dict of (train index, channel) -> Reception; pairs that hear nothing are missing.
         """
-        sending = self._alive(time_s)
-        sending[[station for station in range(len(sending)) if station not in blocks]] = False
+        sending = np.zeros(len(self._sites), dtype=np.bool_)
+        sending[list(blocks)] = True
+        sending &= self._alive(time_s)
         links = np.nonzero(paths.in_coverage & sending[:, None])
         return self._receive(tick, time_s, paths, links, blocks, self._downlink[links[0]])
 
@@ -223,48 +230,53 @@ class RadioMedium:
         if not blocks or not links[0].size:
             return received
         radio = self.description
-        sent_by = links[1 if uplink else 0].tolist()
-        sent = [self._sent(uplink, sender, blocks[sender]) for sender in sent_by]
+        # Each sender that somebody may hear once, and the sender of each link among them.
+        senders, of_link = np.unique(links[1 if uplink else 0], return_inverse=True)
+        sent = [self._sent(uplink, sender, blocks[sender]) for sender in senders.tolist()]
         gain_db = paths.gain_db[links] - self._loss_at_1m_db[channel]
-        power_mw = np.array([block.power_mw for block in sent]) * 10.0 ** (gain_db / 10.0)
-        audible = np.flatnonzero(power_mw >= self._floor_mw)
-        if not audible.size:
+        sent_mw = np.array([block.power_mw for block in sent])
+        power_mw = sent_mw[of_link] * 10.0 ** (gain_db / 10.0)
+        audible = power_mw >= self._floor_mw
+        if not audible.any():
             return received
         s, t = links[0][audible], links[1][audible]
-        power_mw, channel = power_mw[audible], channel[audible]
+        power_mw, channel, gain_db = power_mw[audible], channel[audible], gain_db[audible]
         carrier_hz = self._carrier_hz[channel]
         delay_s = paths.distance_m[s, t] / SPEED_OF_LIGHT_M_PER_S
         doppler_hz = carrier_hz * paths.closing_speed_mps[s, t] / SPEED_OF_LIGHT_M_PER_S
-        offsets = self._station_offset[s] - self._train_offset[t]
-        carrier_phase = -2.0 * np.pi * np.mod(carrier_hz * delay_s, 1.0)
-        arrived = through_paths(
-            _stacked([sent[link].spectrum for link in audible.tolist()]),
-            radio.samples,
-            delay_s=delay_s,
-            shift_hz=doppler_hz + carrier_hz * (-offsets if uplink else offsets),
-            gain=10.0 ** (gain_db[audible] / 20.0) * cis(carrier_phase),
-            sample_rate_hz=radio.sample_rate_hz,
+        offset_hz = carrier_hz * (self._station_offset[s] - self._train_offset[t])
+        shift_hz = doppler_hz - offset_hz if uplink else doppler_hz + offset_hz
+        spectra, periods = _side_by_side([block.spectrum for block in sent])
+        of_link = of_link[audible]
+        period = periods[of_link]
+        arrived = np.empty((len(s), spectra.shape[1]), dtype=np.complex128)
+        delayed_spectra(
+            *(spectra, of_link, period, delay_s * radio.sample_rate_hz),
+            *(10.0 ** (gain_db / 20.0), carrier_hz * delay_s, arrived),
         )
-        arriving: dict[tuple[int, int], list[int]] = {}
-        receivers = (s if uplink else t).tolist()
-        for row, port in enumerate(zip(receivers, channel.tolist(), strict=True)):
-            arriving.setdefault(port, []).append(row)
-        ports = [port[0] * 128 + port[1] for port in arriving]
+        # In double precision, where a row does not depend on the others that are transformed.
+        for length in np.unique(periods).tolist():
+            of_length = period == length
+            arrived[of_length, :length] = np.fft.ifft(arrived[of_length, :length])
+        ports: dict[tuple[int, int], int] = {}
+        receivers = zip((s if uplink else t).tolist(), channel.tolist(), strict=True)
+        rows = [ports.setdefault(port, len(ports)) for port in receivers]
         noise_mw = [
-            self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
-            for port in arriving
+            self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink) for port in ports
         ]
-        noise = self._noise.blocks(2 if uplink else 1, ports, tick, np.array(noise_mw))
-        for (port, rows), total, power in zip(arriving.items(), noise, noise_mw, strict=True):
-            for row in rows:
-                total += arrived[row]
-            strongest = max(rows, key=lambda row: float(power_mw[row]))
-            received[port] = Reception(
-                total,
-                float(power_mw[strongest]),
-                power,
-                (int(s[strongest]), int(t[strongest])),
-            )
+        places = [port[0] * 128 + port[1] for port in ports]
+        heard = self._noise.blocks(2 if uplink else 1, places, tick, np.array(noise_mw))
+        cycles = shift_hz / radio.sample_rate_hz
+        add_links(np.array(rows), period, arrived.view(np.float64), cycles, heard.view(np.float32))
+        strongest = [-1] * len(ports)
+        powers = power_mw.tolist()
+        for link, row in enumerate(rows):
+            if strongest[row] < 0 or powers[link] > powers[strongest[row]]:
+                strongest[row] = link
+        sources = list(zip(s.tolist(), t.tolist(), strict=True))
+        for port, row in ports.items():
+            link = strongest[row]
+            received[port] = Reception(heard[row], powers[link], noise_mw[row], sources[link])
         return received
 
     def _sent(self, uplink: bool, sender: int, samples: ComplexArray) -> _TransmittedBlock:
@@ -309,14 +321,10 @@ class RadioMedium:
         return total
 
 
-def _stacked(spectra: list[ComplexArray]) -> ComplexArray:
-    """Transforms [path, period] of a common period: a shorter one leaves bins empty."""
-    periods = {len(spectrum) for spectrum in spectra}
-    if len(periods) == 1:
-        return np.array(spectra)
-    period = math.lcm(*periods)
-    stacked = np.zeros((len(spectra), period), dtype=np.complex128)
-    for row, spectrum in zip(stacked, spectra, strict=True):
-        repeats = period // len(spectrum)
-        row[::repeats] = spectrum * repeats
-    return stacked
+def _side_by_side(spectra: list[ComplexArray]) -> tuple[ComplexArray, NDArray[np.int64]]:
+    """Transforms [sender, longest period] of one period each, and the periods [sender]."""
+    periods = np.array([len(spectrum) for spectrum in spectra])
+    rows = np.empty((len(spectra), int(periods.max())), dtype=np.complex128)
+    for row, spectrum in zip(rows, spectra, strict=True):
+        row[: len(spectrum)] = spectrum
+    return rows, periods

@@ -21,7 +21,7 @@ from rail_signals.delay import repetition
 
 from .description import AntennaPattern, RadioDescription
 from .noise import NoiseSource
-from .path_kernels import add_links, delayed_spectra, links_in_coverage
+from .path_kernels import add_links, carry, links_in_coverage
 
 THERMAL_NOISE_DBM_PER_HZ = -173.975  # k T at 290 K
 _MIN_DISTANCE_M = 1.0
@@ -44,7 +44,7 @@ class TrainAntennas:
 class Paths:
     """Geometry of one tick between all station and train antennas, arrays [station, train].
 
-    Out of coverage the gain is -inf, the closing speed 0.
+    Out of coverage the gain is -inf, the closing speed 0. ``links`` counts those in coverage.
     """
 
     distance_m: FloatArray
@@ -53,6 +53,7 @@ class Paths:
     in_coverage: NDArray[np.bool_]
     train_position_m: FloatArray
     train_axis: FloatArray
+    links: int
 
 
 @dataclass(frozen=True)
@@ -145,14 +146,14 @@ class RadioMedium:
         axis = -np.stack((np.cos(heading), np.sin(heading), np.zeros_like(heading)), axis=1)
         shape = (len(self._sites), len(heading))
         links, in_coverage = np.empty((3, *shape)), np.empty(shape, dtype=np.bool_)
-        links_in_coverage(
+        count = links_in_coverage(
             self._antennas,
             np.concatenate((trains.position_m, axis, trains.velocity_mps), axis=1),
             self._patterns,
             *(self.description.path_loss_exponent, _MIN_DISTANCE_M),
             *(links, in_coverage),
         )
-        return Paths(*links, in_coverage, trains.position_m, axis)
+        return Paths(*links, in_coverage, trains.position_m, axis, count)
 
     def dead_stations(self, time_s: float) -> set[int]:
         """Indices of station antennas that are dead at ``time_s``."""
@@ -182,11 +183,7 @@ class RadioMedium:
         -------
         dict of (train index, channel) -> Reception; pairs that hear nothing are missing.
         """
-        sending = np.zeros(len(self._sites), dtype=np.bool_)
-        sending[list(blocks)] = True
-        sending &= self._alive(time_s)
-        links = np.nonzero(paths.in_coverage & sending[:, None])
-        return self._receive(tick, time_s, paths, links, blocks, self._downlink[links[0]])
+        return self._receive(tick, time_s, paths, blocks, self._downlink)
 
     def uplink(
         self,
@@ -203,10 +200,8 @@ class RadioMedium:
         channel = np.zeros(paths.in_coverage.shape[1], dtype=np.int64)
         for train, (on, _) in blocks.items():
             channel[train] = on
-        hears = (self._uplink[:, None] == channel) & self._alive(time_s)[:, None]
-        links = np.nonzero(paths.in_coverage & hears)
         sent = {train: samples for train, (_, samples) in blocks.items()}
-        return self._receive(tick, time_s, paths, links, sent, self._uplink[links[0]], uplink=True)
+        return self._receive(tick, time_s, paths, sent, channel, uplink=True)
 
     def _alive(self, time_s: float) -> NDArray[np.bool_]:
         """Which station antennas are not dead."""
@@ -219,65 +214,65 @@ class RadioMedium:
         tick: int,
         time_s: float,
         paths: Paths,
-        links: tuple[NDArray[np.intp], ...],
         blocks: dict[int, ComplexArray],
         channel: NDArray[np.int64],
         *,
         uplink: bool = False,
     ) -> dict[tuple[int, int], Reception]:
-        """Carry ``blocks`` over the links (station, train), each on its channel; add noise."""
-        received: dict[tuple[int, int], Reception] = {}
-        if not blocks or not links[0].size:
-            return received
+        """Carry ``blocks`` of senders, each on its ``channel`` [sender], and add noise."""
+        # Of a long line all stations send, and few have a train in reach.
+        reach = np.flatnonzero(paths.in_coverage.any(axis=0 if uplink else 1)).tolist()
+        senders = [sender for sender in reach if sender in blocks]
+        if not senders:
+            return {}
         radio = self.description
-        # Each sender that somebody may hear once, and the sender of each link among them.
-        senders, of_link = np.unique(links[1 if uplink else 0], return_inverse=True)
-        sent = [self._sent(uplink, sender, blocks[sender]) for sender in senders.tolist()]
-        gain_db = paths.gain_db[links] - self._loss_at_1m_db[channel]
-        sent_mw = np.array([block.power_mw for block in sent])
-        power_mw = sent_mw[of_link] * 10.0 ** (gain_db / 10.0)
-        audible = power_mw >= self._floor_mw
-        if not audible.any():
-            return received
-        s, t = links[0][audible], links[1][audible]
-        power_mw, channel, gain_db = power_mw[audible], channel[audible], gain_db[audible]
-        carrier_hz = self._carrier_hz[channel]
-        delay_s = paths.distance_m[s, t] / SPEED_OF_LIGHT_M_PER_S
-        doppler_hz = carrier_hz * paths.closing_speed_mps[s, t] / SPEED_OF_LIGHT_M_PER_S
-        offset_hz = carrier_hz * (self._station_offset[s] - self._train_offset[t])
-        shift_hz = doppler_hz - offset_hz if uplink else doppler_hz + offset_hz
+        sent = [self._sent(uplink, sender, blocks[sender]) for sender in senders]
+        row_of = np.full(len(channel), -1)
+        row_of[senders] = range(len(sent))
         spectra, periods = _side_by_side([block.spectrum for block in sent])
-        of_link = of_link[audible]
-        period = periods[of_link]
-        arrived = np.empty((len(s), spectra.shape[1]), dtype=np.complex128)
-        delayed_spectra(
-            *(spectra, of_link, period, delay_s * radio.sample_rate_hz),
-            *(10.0 ** (gain_db / 20.0), carrier_hz * delay_s, arrived),
+        table = np.empty((paths.links, 5), dtype=np.int64)
+        values = np.empty((paths.links, 2))
+        arrived = np.empty((paths.links, spectra.shape[1]), dtype=np.complex128)
+        count, port_count = carry(
+            uplink,
+            (row_of, channel, periods, np.array([block.power_mw for block in sent]), spectra),
+            (
+                self._uplink if uplink else self._downlink,
+                *(self._alive(time_s), self._station_offset),
+            ),
+            self._train_offset,
+            (self._carrier_hz, self._loss_at_1m_db),
+            (paths.in_coverage, paths.distance_m, paths.closing_speed_mps, paths.gain_db),
+            (self._floor_mw, SPEED_OF_LIGHT_M_PER_S, radio.sample_rate_hz),
+            (table, values, arrived),
         )
+        if not count:
+            return {}
+        table, values, arrived = table[:count], values[:count], arrived[:count]
         # In double precision, where a row does not depend on the others that are transformed.
-        for length in np.unique(periods).tolist():
-            of_length = period == length
-            arrived[of_length, :length] = np.fft.ifft(arrived[of_length, :length])
-        ports: dict[tuple[int, int], int] = {}
-        receivers = zip((s if uplink else t).tolist(), channel.tolist(), strict=True)
-        rows = [ports.setdefault(port, len(ports)) for port in receivers]
+        for period in set(periods.tolist()):
+            rows = table[:, 3] == period
+            arrived[rows, :period] = np.fft.ifft(arrived[rows, :period])
+        # Of each port the strongest link, in the order of the ports.
+        links = table[table[:, 4] == 1]
+        power_mw = values[table[:, 4] == 1, 0].tolist()
+        order = np.argsort(links[:, 0]).tolist()
+        sources = links[:, 1:3].tolist()
+        numbers = self._uplink if uplink else self._downlink
+        ports = [
+            (source[0 if uplink else 1], int(numbers[source[0]]))
+            for source in (sources[link] for link in order)
+        ]
         noise_mw = [
             self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink) for port in ports
         ]
         places = [port[0] * 128 + port[1] for port in ports]
         heard = self._noise.blocks(2 if uplink else 1, places, tick, np.array(noise_mw))
-        cycles = shift_hz / radio.sample_rate_hz
-        add_links(np.array(rows), period, arrived.view(np.float64), cycles, heard.view(np.float32))
-        strongest = [-1] * len(ports)
-        powers = power_mw.tolist()
-        for link, row in enumerate(rows):
-            if strongest[row] < 0 or powers[link] > powers[strongest[row]]:
-                strongest[row] = link
-        sources = list(zip(s.tolist(), t.tolist(), strict=True))
-        for port, row in ports.items():
-            link = strongest[row]
-            received[port] = Reception(heard[row], powers[link], noise_mw[row], sources[link])
-        return received
+        add_links(table, values, arrived.view(np.float64), heard.view(np.float32))
+        return {
+            port: Reception(samples, power_mw[link], noise, (sources[link][0], sources[link][1]))
+            for port, samples, noise, link in zip(ports, heard, noise_mw, order, strict=True)
+        }
 
     def _sent(self, uplink: bool, sender: int, samples: ComplexArray) -> _TransmittedBlock:
         """Power and spectrum of a block; a block that is sent again is not transformed again."""

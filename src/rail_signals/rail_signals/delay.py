@@ -47,8 +47,13 @@ def fractional_delay(blocks: ArrayLike, delay_s: ArrayLike, sample_rate_hz: floa
     delay = np.asarray(delay_s, dtype=np.float64)
     if not np.isfinite(delay).all():
         raise ValueError("delay_s must be finite")
-    ramp = _phase_ramp(delay * sample_rate_hz, x.shape[-1])
-    return np.fft.ifft(np.fft.fft(x) * ramp)
+    return delayed(np.fft.fft(x), delay, sample_rate_hz)
+
+
+def delayed(spectra: ComplexArray, delay_s: FloatArray, sample_rate_hz: float) -> ComplexArray:
+    """Blocks [..., samples] of the transforms of blocks, delayed as by `fractional_delay`."""
+    ramp = _phase_ramp(delay_s * sample_rate_hz, spectra.shape[-1])
+    return np.fft.ifft(spectra * ramp)
 
 
 def repetition(block: ComplexArray, guess: int = 0) -> int:

@@ -68,9 +68,13 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         self._ready_publisher: Any = None
         self._ready_timer: Any = None
 
+    def name_of(self, topic: Topic, **parts: object) -> str:
+        """Name of a topic as this node asks for it, before its remapping rules."""
+        return topic.name(**parts)
+
     def publisher(self, topic: Topic, **parts: object) -> Any:
         """Publisher of a topic of the table."""
-        publisher = self.create_publisher(topic.type, topic.name(**parts), topic.qos)
+        publisher = self.create_publisher(topic.type, self.name_of(topic, **parts), topic.qos)
         return tapped(self.context, topic, publisher)
 
     def stream_out(self, topic: Topic, **parts: object) -> Callable[[bytes], None]:
@@ -114,13 +118,14 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
 
     def stream_in(self, topic: Topic, callback: Callable[[bytes], None], **parts: object) -> None:
         """Subscribe to serialised messages of a topic of the table."""
-        name = topic.name(**parts)
+        name = self.name_of(topic, **parts)
         self._subscribe(topic.type, name, callback, topic.qos, raw=True)
-        self._connections.append(lambda: self.count_publishers(name) > 0)
+        remapped = self.resolve_topic_name(name)
+        self._connections.append(lambda: self.count_publishers(remapped) > 0)
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         """Subscribe to messages of a topic that nothing waits for."""
-        self._subscribe(topic.type, topic.name(**parts), callback, topic.qos, raw=False)
+        self._subscribe(topic.type, self.name_of(topic, **parts), callback, topic.qos, raw=False)
 
     def _subscribe(
         self,

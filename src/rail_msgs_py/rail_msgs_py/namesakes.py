@@ -21,10 +21,13 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from type_description_interfaces.srv import GetTypeDescription
 
-#: Wall time in which discovery shows a namesake.
-LOOK_S = 1.0
+#: Wall time in which discovery shows a namesake: an announcement may be three seconds away.
+LOOK_S = 3.5
+#: ... and once it has shown anybody.
+SETTLED_S = 1.0
 #: ... and in which one that is alive answers.
 ANSWER_S = 2.0
+_QUESTIONS = 10
 
 
 class NameTakenError(ValueError):
@@ -74,12 +77,26 @@ def _answers(context: Any, name: str) -> bool:
         return condition()
 
     try:
-        if not when(lambda: asker.get_fully_qualified_node_names().count(name) > 1, LOOK_S):
+        begun_s = time.monotonic()
+
+        def seen() -> bool:
+            names = asker.get_fully_qualified_node_names()
+            company = len({*names} - {name, asker.get_fully_qualified_name()}) > 0
+            enough = company and time.monotonic() - begun_s > SETTLED_S
+            return enough or names.count(name) > 1
+
+        when(seen, LOOK_S)
+        if asker.get_fully_qualified_node_names().count(name) < 2:
             return False
         client = asker.create_client(GetTypeDescription, f"{name}/get_type_description")
         anything = GetTypeDescription.Request(type_name="none", type_hash=f"RIHS01_{0:064x}")
-        answer = client.call_async(anything)
-        return when(answer.done, ANSWER_S)
+        # Again and again: of two servers of one name nothing tells when the other is connected.
+        answers: list[Any] = []
+        for _ in range(_QUESTIONS):
+            answers.append(client.call_async(anything))
+            if when(lambda: any(answer.done() for answer in answers), ANSWER_S / _QUESTIONS):
+                return True
+        return False
     finally:
         executor.shutdown()
         asker.destroy_node()

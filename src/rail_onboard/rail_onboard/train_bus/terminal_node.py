@@ -51,7 +51,7 @@ class BusTerminalNode(EquipmentNode[BusTerminalParameters], name="bus_head", nam
     _p = BusTerminalParameters()
 
     @property
-    def listed_name(self) -> str:  # type: ignore[override]
+    def listed_name(self) -> str:
         """Full name under which the table of topics has this terminal."""
         return f"/{self.place}/bus_{self._p.end}"
 

@@ -29,7 +29,7 @@ _PROFILE: Final = "fastdds.xml"
 
 _HEAD: Final = """\
 #!/usr/bin/env bash
-# {scenario}: {count} nodes by hand, and the report. As a whole: bash {commands} [--report FILE.json]
+# {scenario}, {count} nodes and the report; all of it: bash {commands} [--report FILE.json]
 # On several hosts: copy the folder, go into it, and run some of the lines on each.
 cd "$(dirname "$0")" || exit 1
 PYTHON="${{PYTHON:-{python}}}"
@@ -49,9 +49,9 @@ parameters/        a ROS parameter file for each node
 {profile}        settings of the middleware, for bursts of waveforms
 {commands}        the command line of every node, and of the report
 
-`bash {commands}` starts every node in a process of its own on this host, then the report, and ends
-the nodes with it. Or start any of them by hand, from within this folder, on any host that has a copy
-of it: the world file is named relative to it. With ament packages, for example:
+`bash {commands}` starts every node in a process of its own on this host, then the report, and
+ends the nodes with it. Or start any of them by hand, from within this folder, on any host that has
+a copy of it: the world file is named relative to it. With ament packages, for example:
 
     {ros2_run}
 

@@ -38,6 +38,7 @@ from .external_traffic import FULL_NAME as EXTERNAL_TRAFFIC
 from .external_traffic import ExternalTrafficRecorder
 from .host import make_context, make_nodes, run_nodes
 from .kills import FaultInjector, Kill, check_kills
+from .parameter_services import ParameterServicesOnDemand
 from .processes import ProcessGroup, remove_orphaned_segments
 
 if TYPE_CHECKING:
@@ -236,6 +237,7 @@ class _LaunchedRun:
             nodes.append(recorder)
             if self._options.only == "report":  # the world elsewhere knows of the report alone
                 self._observer.await_connection(lambda: recorder.connected)
+        ParameterServicesOnDemand(nodes, (spec.name for spec in self._plan.nodes))
         executor = EventsExecutor(context=context)
         for node in nodes:
             executor.add_node(node)

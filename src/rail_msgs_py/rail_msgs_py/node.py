@@ -73,9 +73,13 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         """Delivery to the other nodes of the process, if it has one."""
         return getattr(self.context, "delivery", None)
 
+    def name_of(self, topic: Topic, **parts: object) -> str:
+        """Name of a topic as this node asks for it, before its remapping rules."""
+        return topic.name(**parts)
+
     def publisher(self, topic: Topic, **parts: object) -> CorridorPublisher:
         """Publisher of a topic of the table."""
-        publisher = self.create_publisher(topic.type, topic.name(**parts), topic.qos)
+        publisher = self.create_publisher(topic.type, self.name_of(topic, **parts), topic.qos)
         tap = getattr(self.context, "tap", None)
         return CorridorPublisher(topic, publisher, tap, self._delivery)
 
@@ -155,10 +159,11 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         take_view: Callable[[Any], None] | None,
         parts: Mapping[str, object],
     ) -> None:
-        name, delivery = topic.name(**parts), self._delivery
+        asked, delivery = self.name_of(topic, **parts), self._delivery
+        name = self.resolve_topic_name(asked)
 
         def subscribe() -> None:
-            self.create_subscription(topic.type, name, self.guarded(take_raw), topic.qos, raw=True)
+            self.create_subscription(topic.type, asked, self.guarded(take_raw), topic.qos, raw=True)
 
         if delivery is None:
             subscribe()
@@ -173,7 +178,8 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         """Subscribe to messages of a topic that nothing waits for."""
-        self.create_subscription(topic.type, topic.name(**parts), self.guarded(callback), topic.qos)
+        name = self.name_of(topic, **parts)
+        self.create_subscription(topic.type, name, self.guarded(callback), topic.qos)
 
     def guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
         """Callback for the executor; what it sends within the process is handed over after it.

@@ -77,9 +77,14 @@ def zone_map_of(p: ZoneControllerParameters) -> ZoneMap:
         If the arrays do not fit together.
     """
     count = len(p.zones)
+    if count == 0:
+        raise ParameterError("zones: (): at least one is needed")
     for name in ("sites", "tracks", "starts_m", "ends_m", "table_sizes"):
         if len(getattr(p, name)) != count:
             raise ParameterError(f"{name}: {len(getattr(p, name))} entries for {count} zones")
+    for name, other in (("follows_to", "follows_from"), ("entry_zones", "trains")):
+        if len(getattr(p, name)) != len(getattr(p, other)):
+            raise ParameterError(f"{name}: {getattr(p, name)}: does not go with {other}")
     total = sum(p.table_sizes)
     if not len(p.table_chainage_m) == len(p.table_distance_m) == total:
         raise ParameterError(f"table_chainage_m: {len(p.table_chainage_m)} points, not {total}")

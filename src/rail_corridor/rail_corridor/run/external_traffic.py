@@ -60,6 +60,11 @@ class ExternalTrafficRecorder(CorridorNode):
         self._poll_timer = self.every(_POLL_S, self._poll)
         self.announce_when_connected(lambda: not self._polls)
 
+    @property
+    def connected(self) -> bool:
+        """Whether it hears all of them."""
+        return not self._connections
+
     def _poll(self) -> None:
         """Look for topics of the nodes that have said that they are ready."""
         for external_node in [name for name in self._polls if name in self._present]:

@@ -15,8 +15,8 @@ from rail_corridor.equipment.registry import node_kinds
 if TYPE_CHECKING:
     from rail_msgs_py.tap import Tap
 
-#: With more nodes than this in a process the services are left out.
-MOST_NODES_WITH_SERVICES = 12
+#: With more nodes than this in a process the services are left out until somebody asks for them.
+MOST_NODES_WITH_SERVICES = 24
 
 
 def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:

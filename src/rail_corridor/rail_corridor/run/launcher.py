@@ -10,7 +10,7 @@ import tempfile
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
@@ -20,7 +20,15 @@ from rail_corridor.errors import InputError
 from rail_corridor.loading.scenario_files import files_of
 from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.middleware.domain import sole_corridor
-from rail_corridor.plan.plan import REPORT, WORLD, Placement, Plan, check_external, make_plan
+from rail_corridor.plan.plan import (
+    REPORT,
+    WORLD,
+    Part,
+    Placement,
+    Plan,
+    check_external,
+    make_plan,
+)
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
 from rail_corridor.report.report import make_report, print_report, report_text, write_report
@@ -30,6 +38,7 @@ from .external_traffic import FULL_NAME as EXTERNAL_TRAFFIC
 from .external_traffic import ExternalTrafficRecorder
 from .host import make_context, make_nodes, run_nodes
 from .kills import FaultInjector, Kill, check_kills
+from .parameter_services import ParameterServicesOnDemand
 from .processes import ProcessGroup, remove_orphaned_segments
 
 if TYPE_CHECKING:
@@ -51,7 +60,7 @@ class RunOptions:
 
     rate: float = 0.0
     placement: Placement | None = None
-    only: Literal["wayside", "onboard"] | None = None
+    only: Part | None = None
     report: Path | None = None
     timeout_s: float = 30.0
     external: tuple[str, ...] = ()
@@ -225,7 +234,11 @@ class _LaunchedRun:
             others = [spec.name for spec in self._plan.nodes if spec.name not in ours]
             from .run_recording import SHARED
 
-            nodes.append(ExternalTrafficRecorder(others, tap.open, SHARED, context=context))
+            recorder = ExternalTrafficRecorder(others, tap.open, SHARED, context=context)
+            nodes.append(recorder)
+            if self._options.only == "report":  # the world elsewhere knows of the report alone
+                self._observer.await_connection(lambda: recorder.connected)
+        ParameterServicesOnDemand(nodes, (spec.name for spec in self._plan.nodes))
         executor = EventsExecutor(context=context)
         for node in nodes:
             executor.add_node(node)

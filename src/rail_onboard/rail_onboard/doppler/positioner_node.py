@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rail_msgs_py.decoders import block
 from rail_msgs_py.doppler import quantities
 from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
-from rail_msgs_py.parameters import parameter
+from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.quantities import DIRECTION_OR_UNKNOWN, TRAIN_START
 from rail_msgs_py.stamps import NANOSECONDS
@@ -89,6 +89,8 @@ class DopplerPositionerNode(
     def setup(self) -> None:
         """Open the ports of the train."""
         p, train = self._p, self.place
+        if len(p.line_chainage_m) < 2:
+            raise ParameterError(f"line_chainage_m: {p.line_chainage_m}: needs two points or more")
         self._fix = self.table_out(DOPPLER_FIX, (train,), awaited=p.localizer, train=train)
         self._position = self.publisher(DOPPLER_POSITION, train=train).send
         self._writer = PositionWriter(train, p.track)

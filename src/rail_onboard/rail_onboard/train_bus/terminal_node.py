@@ -48,6 +48,14 @@ class BusTerminalParameters:
 class BusTerminalNode(EquipmentNode[BusTerminalParameters], name="bus_head", namespace="/train_1"):
     """A terminal as a managed node; switched off it neither speaks nor listens."""
 
+    #: Those of the kind, until its own have been declared.
+    _p = BusTerminalParameters()
+
+    @property
+    def listed_name(self) -> str:
+        """Full name under which the table of topics has this terminal."""
+        return f"/{self.place}/bus_{self._p.end}"
+
     def setup(self) -> None:
         """Open the ports of its end of the train."""
         p, train = self._p, self.place

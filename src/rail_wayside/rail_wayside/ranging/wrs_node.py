@@ -6,7 +6,7 @@ Topics, for each of its zones: in ``/clock``, ``<zone>/rx``; out ``<zone>/tx``, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -57,6 +57,16 @@ class _Antenna:
 class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
     """Wayside station as a managed node."""
 
+    @cached_property
+    def place(self) -> str:
+        """Site: a station is named after it."""
+        return str(self.get_name())
+
+    @cached_property
+    def listed_name(self) -> str:
+        """Full name under which the table of topics has this station."""
+        return f"{self.default_namespace}/{self.place}"
+
     def setup(self) -> None:
         """Make the tone, and open the ports of the antenna into every zone."""
         p = self._p
@@ -71,7 +81,7 @@ class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
         tone = modulate(signal, np.zeros(len(signal.tones_hz)))
         sent = tone[None, :] * 10.0 ** (p.power_dbm / 20.0)
         low_m, high_m = self._station.interval_m
-        site = self.get_name()
+        site = self.place
         self._antennas: list[_Antenna] = []
         for zone, channel, uplink_channel, carrier_hz in zip(
             p.zones, p.downlink_channels, p.uplink_channels, p.downlink_carriers_hz, strict=True

@@ -260,7 +260,8 @@ class CbtcMedium:
                 placed.append((start, stop, at))
                 at += stop - start
             received[key] = tuple(
-                Burst(start, heard[:, begin : begin + stop - start]) for start, stop, begin in placed
+                Burst(start, heard[:, begin : begin + stop - start])
+                for start, stop, begin in placed
             )
             for base, train, bursts in port.sources:
                 for burst in bursts:

@@ -39,7 +39,7 @@ _DEVICE = "wire"
 
 
 class NoLinkError(OSError):
-    """This machine, or this user, may not have such a link."""
+    """Machine or user may not have such a link."""
 
 
 @dataclass

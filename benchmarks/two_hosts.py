@@ -26,8 +26,8 @@ from rich.console import Console
 from rich.table import Table
 
 RAIL = [sys.executable, "-m", "rail_corridor.cli.main", "run"]
-#: Wall time for the trains' half to end by itself when the wayside has finished [s].
-AFTER_S = 2.0
+#: Wall time for a half of a run to end by Ctrl-C [s].
+GRACE_S = 30.0
 
 
 def run_two_hosts(
@@ -58,38 +58,42 @@ def run_two_hosts(
     NoLinkError
         Where the machine or the user may not have such a link.
     """
-    inherited = {
+    environment = {
         name: value
-        for name, value in os.environ.items()
-        # Hosts that may hear each other by nothing but the wire.
+        for name, value in {**os.environ, **(environment or {})}.items()
+        # Two hosts hear each other by what a user would have, not by what tests set.
         if name not in ("ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTDDS_BUILTIN_TRANSPORTS")
     }
-    options: dict[str, Any] = {
-        "env": inherited | (environment or {}),
-        "stdout": subprocess.DEVNULL,
-        "stderr": subprocess.DEVNULL,
-    }
     with tempfile.TemporaryDirectory() as folder, LossyLink(loss, seed) as link:
-        wayside_host, onboard_host = link.hosts
-        path = Path(folder) / "report.json"
-        onboard = onboard_host.start([*RAIL, *scenario, "--only", "onboard"], **options)
-        wayside = wayside_host.start(
-            [*RAIL, *scenario, "--only", "wayside", "--report", str(path)], **options
-        )
+        path, log = Path(folder) / "report.json", Path(folder) / "stderr"
+        halves = []
+        with log.open("w") as stderr:
+            options: dict[str, Any] = {
+                "env": environment,
+                "stdout": subprocess.DEVNULL,
+                "stderr": stderr,
+            }
+            # The wayside first: it is the one to end by itself, and to be asked first.
+            for host, part in zip(link.hosts, ("wayside", "onboard"), strict=True):
+                command = [*RAIL, *scenario, "--only", part]
+                command += ["--report", str(path)] if part == "wayside" else []
+                halves.append(host.start(command, **options))
         try:
-            interrupted = not _ends(wayside, patience_s)
+            interrupted = not _ends(halves[0], patience_s)
         finally:
-            for process in (wayside, onboard):
+            for process in halves:
                 _end(process)
-        report = json.loads(path.read_text()) if path.exists() else {}
+        if not path.exists():
+            raise RuntimeError(f"a half made no report:\n{log.read_text()}")
+        report = json.loads(path.read_text())
         return {
             "loss": loss,
-            "real_time_factor": report.get("real_time_factor"),
-            "ticks": report.get("ticks", 0),
-            "complete": bool(report.get("complete")) and not interrupted,
-            "failures": report.get("failures", []),
-            "missing_ticks": report.get("missing_ticks"),
-            "digest": report.get("digest"),
+            "real_time_factor": report["real_time_factor"],
+            "ticks": report["ticks"],
+            "complete": bool(report["complete"]) and not interrupted,
+            "failures": report["failures"],
+            "missing_ticks": report["missing_ticks"],
+            "digest": report["digest"],
             "packets": sum(way.frames for way in link.ways),
             "octets": sum(way.octets for way in link.ways),
             "dropped": sum(way.dropped for way in link.ways),
@@ -106,17 +110,17 @@ def _ends(process: subprocess.Popen[str], patience_s: float) -> bool:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a half of a run: by itself, by Ctrl-C, and without exception."""
-    if _ends(process, AFTER_S):
+    """End a half of a run that has not ended by itself: by Ctrl-C, and without exception."""
+    if process.poll() is not None:
         return
     process.send_signal(signal.SIGINT)
-    if not _ends(process, 30.0):
+    if not _ends(process, GRACE_S):
         process.kill()
         process.wait()
 
 
 def _overflows(host: LinkedHost) -> int:
-    """Packets that were lost elsewhere than on the wire: in queues of the host."""
+    """Packets lost elsewhere than on the wire: they found no room in a queue of the host."""
     return host.overflow() + host.counter("Udp", "RcvbufErrors")
 
 
@@ -130,17 +134,18 @@ def one_host(scenario: list[str]) -> dict[str, Any]:
         return report
 
 
-def table(rows: list[dict[str, Any]], digest: str) -> Table:
-    """Rows as they are printed."""
+def table(rows: list[dict[str, Any]], whole: dict[str, Any]) -> Table:
+    """Rows as they are printed, under the report of the run on one host."""
     shown = Table()
     for title in ("loss", "x real time", "digest", "failed", "packets", "dropped", "overflows"):
         shown.add_column(title, justify="right")
+    shown.add_row("one host", f"{whole['real_time_factor']:.2f}", "", str(len(whole["failures"])))
     for row in rows:
         factor = row["real_time_factor"]
         shown.add_row(
             f"{row['loss']:.1%}",
             f"{factor:.2f}" if factor else "-",
-            "the same" if row["digest"] == digest else "another",
+            "the same" if row["digest"] == whole["digest"] else "another",
             str(len(row["failures"])) if row["complete"] else f"stopped at tick {row['ticks']}",
             str(row["packets"]),
             f"{row['dropped'] / max(row['packets'], 1):.2%}",
@@ -164,7 +169,7 @@ def main() -> int:
     more = {}
     if arguments.profile is not None:
         more["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(arguments.profile.resolve())
-    digest = one_host(scenario)["digest"]
+    whole = one_host(scenario)
     try:
         rows = [
             run_two_hosts(
@@ -179,7 +184,7 @@ def main() -> int:
     except NoLinkError as error:
         console.print(f"this machine permits no lossy link: {error}")
         return 1
-    console.print(table(rows, digest))
+    console.print(table(rows, whole))
     if arguments.json is not None:
         arguments.json.write_text(json.dumps(rows, indent=1))
     return 0

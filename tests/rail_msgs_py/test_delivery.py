@@ -34,7 +34,7 @@ class Tasks:
 
 @pytest.fixture
 def delivery() -> LocalDelivery:
-    return LocalDelivery(alone=True)
+    return LocalDelivery()
 
 
 def never() -> None:

@@ -15,11 +15,13 @@ class CorridorContext(Context):  # type: ignore[misc]
     ----------
     tap : Tap, optional
         Is told of everything that they publish.
-    alone : bool
-        As of `LocalDelivery`.
+    report_reads : frozenset of str
+        Names of the topics that a report in another process reads: its ear must be open before
+        their nodes are ready.
     """
 
-    def __init__(self, tap: Tap | None = None, *, alone: bool = False) -> None:
+    def __init__(self, tap: Tap | None = None, report_reads: frozenset[str] = frozenset()) -> None:
         super().__init__()
         self.tap = tap
-        self.delivery = LocalDelivery(alone=alone)
+        self.report_reads = report_reads
+        self.delivery = LocalDelivery()

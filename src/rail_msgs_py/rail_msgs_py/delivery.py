@@ -101,17 +101,9 @@ class Line:
 
 
 class LocalDelivery:
-    """Hands the messages of one process from node to node.
+    """Hands the messages of one process from node to node."""
 
-    Parameters
-    ----------
-    alone : bool
-        Whether all nodes of the corridor are in this process. Others then only look on: they
-        hear what is sent from when they have come.
-    """
-
-    def __init__(self, *, alone: bool) -> None:
-        self.alone = alone
+    def __init__(self) -> None:
         self._lines: dict[str, Line] = {}
         self._queue: deque[tuple[Callable[[Any], None], Any]] = deque()
         self._under_way = False

@@ -11,7 +11,9 @@ Item = TypeVar("Item")
 class TickInbox(Generic[Item]):
     """Collects exactly one item per port and tick, whatever the order of arrival.
 
-    A port whose node failed is not waited for; it is again as soon as it is heard.
+    A port whose node failed is not waited for; it is again as soon as it is heard. Each port brings
+    its items in the order of their ticks: one that has brought a later item has none for the tick
+    at hand, be it that it was connected in the midst of a run.
 
     >>> inbox = TickInbox(["a", "b"])
     >>> inbox.put(0, "b", 2.0)
@@ -56,11 +58,17 @@ class TickInbox(Generic[Item]):
 
     @property
     def complete(self) -> bool:
-        """Whether every awaited port of the earliest tick has been heard."""
+        """Whether nothing more can come for the earliest tick."""
         items = self._first
-        if items is None or len(items) < len(self._awaited):
+        if items is None:
             return False
-        return self._awaited <= items.keys()
+        if len(items) < len(self._awaited):
+            if len(self._ticks) == 1:
+                return False
+        elif self._awaited <= items.keys():
+            return True
+        missing = self._awaited - items.keys()
+        return all(any(port in items for items in self._ticks.values()) for port in missing)
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -75,6 +83,13 @@ class TickInbox(Generic[Item]):
     def drop(self, ports: Iterable[str]) -> None:
         """Wait no longer for these ports."""
         self._awaited.difference_update(ports)
+
+    def close(self, stamp_ns: int) -> None:
+        """Forget a tick and those before it: what comes late only shows that its port is alive."""
+        self._latest_taken_ns = max(self._latest_taken_ns, stamp_ns)
+        for old_ns in [one_ns for one_ns in self._ticks if one_ns <= stamp_ns]:
+            del self._ticks[old_ns]
+        self._find_first()
 
     def take(self) -> tuple[int, dict[str, Item]]:
         """Stamp and items of the earliest tick, complete or not.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -14,18 +14,26 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy
+from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
-from rail_msgs_py.topics.tick import DIAGNOSTICS, READY
+from rail_msgs_py.topics.tick import CLOCK, DIAGNOSTICS, NO_READER, NO_SENDER, READY, WAITING
 from rail_msgs_py.topics.topic import Topic
 
 from .delivery import Decoder, LocalDelivery, LocalReader, Send, view_reader
 from .parameters import overrides
 from .publisher import CorridorPublisher
-from .stamps import to_time
+from .stamps import NANOSECONDS, clock_to_cdr
 from .table import TableWriter
 
 READY_POLL_S = 0.05
+#: Wall time without a new connection after which a node says what it waits for.
+STALLED_S = 1.0
+#: Node that reads the run for its report.
+REPORT_NAME = "report"
+# Of a serialised DiagnosticArray: what stands before the name of its frame.
+_STAMP_BYTES = 12
 #: Which services a node offers beside its topics: all, none, or the lifecycle's alone.
 Services = bool | Literal["switches"]
 
@@ -52,6 +60,24 @@ def node_arguments(
     }
 
 
+class Connection(NamedTuple):
+    """What a node needs before the first tick.
+
+    Parameters
+    ----------
+    made : callable
+        Whether it is there.
+    topic : str
+        Name of the topic; empty if it is something else.
+    lacks : str
+        What is missing as long as it is not there.
+    """
+
+    made: Callable[[], bool]
+    topic: str = ""
+    lacks: str = ""
+
+
 # To the type checker the mixin has what rclpy's nodes have; at run time it stands before them.
 _RosNode: Any = Node if TYPE_CHECKING else object
 
@@ -61,11 +87,16 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
 
     def init_corridor(self) -> None:
         """Create what every node has; call once after the node's own constructor."""
-        self._connections: list[Callable[[], bool]] = []
+        self._connections: list[Connection] = []
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._diagnostics = self.publisher(DIAGNOSTICS)
-        self._health: dict[str, tuple[bytes, str]] = {}
+        self._publish_health = self.publisher(DIAGNOSTICS).send
+        self._health: dict[str, DiagnosticStatus] = {}
+        self._health_cdr: bytes | None = None
+        self._now_ns = 0
+        self._second = -1
         self._ready_publisher: Any = None
+        self._waiting_publisher: Any = None
+        self._lacked: tuple[tuple[str, str], ...] = ()
         self._ready_timer: Any = None
 
     @property
@@ -80,8 +111,26 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
     def publisher(self, topic: Topic, **parts: object) -> CorridorPublisher:
         """Publisher of a topic of the table."""
         publisher = self.create_publisher(topic.type, self.name_of(topic, **parts), topic.qos)
+        if publisher.topic_name in getattr(self.context, "report_reads", ()):
+            self._await_report(publisher)
         tap = getattr(self.context, "tap", None)
         return CorridorPublisher(topic, publisher, tap, self._delivery)
+
+    def _await_report(self, publisher: Any) -> None:
+        """Wait until what is published is heard by the report, as by all readers known here."""
+        name, offered = publisher.topic_name, publisher.qos_profile.durability
+
+        def heard() -> bool:
+            # Who asks for what was said before it came is never connected to who keeps nothing.
+            compatible = [
+                reader.node_name
+                for reader in self.get_subscriptions_info_by_topic(name)
+                if reader.qos_profile.durability in (offered, DurabilityPolicy.VOLATILE)
+            ]
+            count = publisher.get_subscription_count()
+            return REPORT_NAME in compatible and bool(count >= len(compatible))
+
+        self.await_connection(heard, name, NO_READER)
 
     def stream_out(self, topic: Topic, **parts: object) -> Send:
         """Function that sends messages to a reader that the tick waits for.
@@ -89,7 +138,8 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         It takes a view, such as `Waveform`, or a serialised message.
         """
         publisher = self.publisher(topic, **parts)
-        self._connections.append(lambda: publisher.get_subscription_count() > 0)
+        name = publisher.topic_name
+        self.await_connection(lambda: publisher.get_subscription_count() > 0, name, NO_READER)
         return publisher.send
 
     def table_out(
@@ -138,6 +188,8 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
 
         What a node of the same process sends is not serialised on the way.
         """
+        if topic is CLOCK:
+            callback = self._keeping_time(callback)
 
         def take_raw(raw: bytes) -> None:
             callback(*decode(raw))
@@ -167,14 +219,16 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
 
         if delivery is None:
             subscribe()
-            self._connections.append(lambda: self.count_publishers(name) > 0)
+            self.await_connection(lambda: self.count_publishers(name) > 0, name, NO_SENDER)
             return
         safely = self._safely
         reader = LocalReader(
             self, safely(take_raw), None if take_view is None else safely(take_view)
         )
         line = delivery.read(name, reader, subscribe)
-        self._connections.append(lambda: line.writers > 0 or self.count_publishers(name) > 0)
+        self.await_connection(
+            lambda: line.writers > 0 or self.count_publishers(name) > 0, name, NO_SENDER
+        )
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         """Subscribe to messages of a topic that nothing waits for."""
@@ -216,24 +270,61 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         """Steady wall-clock time, that of `every`; without the objects of rclpy around it."""
         return time.monotonic()
 
-    def await_connection(self, condition: Callable[[], bool]) -> None:
-        """Add a condition to those that `announce_when_connected` waits for."""
-        self._connections.append(condition)
+    def await_connection(
+        self, condition: Callable[[], bool], topic: str = "", lacks: str = ""
+    ) -> None:
+        """Add a condition to those that `announce_when_connected` waits for; see `Connection`."""
+        self._connections.append(Connection(condition, topic, lacks))
+
+    def lacking(self) -> list[Connection]:
+        """Connections that are not there yet."""
+        self._connections = [one for one in self._connections if not one.made()]
+        return list(self._connections)
 
     def announce_when_connected(self, condition: Callable[[], bool] | None = None) -> None:
-        """Publish the node's name on ``/ready`` once all its streams have a counterpart."""
+        """Publish the node's name on ``/ready`` once all its streams have a counterpart.
+
+        What it waits for in vain is published on ``/waiting``: the world knows whether anybody
+        is left who could be that counterpart.
+        """
         if condition is not None:
             self.await_connection(condition)
         self._ready_publisher = self.publisher(READY)
 
+        since_s = self.steady_s()
+
         def poll() -> None:
-            while self._connections and self._connections[-1]():
+            nonlocal since_s
+            while self._connections and self._connections[-1].made():
                 self._connections.pop()
+                since_s = self.steady_s()
             if not self._connections:
                 self._ready_publisher.publish(String(data=self.get_fully_qualified_name()))
                 self._ready_timer.cancel()
+            elif self.steady_s() - since_s > STALLED_S:
+                self._tell_what_is_lacking()
+                since_s = self.steady_s()
 
         self._ready_timer = self.every(READY_POLL_S, poll)
+
+    def _tell_what_is_lacking(self) -> None:
+        """Publish on ``/waiting`` what has no counterpart, if that is something new."""
+        lacking = tuple(sorted({(one.topic, one.lacks) for one in self.lacking()}))
+        if not lacking or lacking == self._lacked:
+            return
+        if self._waiting_publisher is None:
+            self._waiting_publisher = self.publisher(WAITING)
+        self._lacked = lacking
+        name = self.get_fully_qualified_name()
+        self._waiting_publisher.publish(
+            DiagnosticStatus(
+                level=DiagnosticStatus.WARN,
+                name=name,
+                message=f"waits for {len(lacking)} connections",
+                hardware_id=name,
+                values=[KeyValue(key=topic, value=lacks) for topic, lacks in lacking],
+            )
+        )
 
     def report(
         self,
@@ -241,23 +332,62 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         what: str,
         message: str,
         values: Iterable[tuple[str, str]] = (),
-        stamp_ns: int = 0,
+        stamp_ns: int | None = None,
     ) -> None:
-        """Publish the health of one aspect of the node, if it changed."""
-        if self._health.get(what) == (level, message):
+        """Publish the health of one aspect of the node, if it changed.
+
+        Without a stamp it is of the tick at hand.
+        """
+        before = self._health.get(what)
+        if before is not None and (before.level, before.message) == (level, message):
             return
-        self._health[what] = (level, message)
-        status = DiagnosticStatus(
+        status = self._status(what, level, message, values)
+        self._health[what] = status
+        self._health_cdr = None
+        now_ns = self._now_ns if stamp_ns is None else stamp_ns
+        self._tell_health(now_ns, _without_stamp([status]))
+
+    def at_tick(self, stamp_ns: int) -> None:
+        """Take the simulated time; tell the health of the node in the first tick of each second."""
+        self._now_ns = stamp_ns
+        second = stamp_ns // NANOSECONDS
+        if second == self._second:
+            return
+        self._second = second
+        if self._health_cdr is None:
+            alive = self._status("node", DiagnosticStatus.OK, "running")
+            self._health_cdr = _without_stamp([*self._health.values()] or [alive])
+        self._tell_health(stamp_ns, self._health_cdr)
+
+    def _keeping_time(self, callback: Callable[[int, Any], None]) -> Callable[[int, Any], None]:
+        """Callback of what begins a tick."""
+        at_tick = self.at_tick
+
+        def run(stamp_ns: int, item: Any) -> None:
+            at_tick(stamp_ns)
+            callback(stamp_ns, item)
+
+        return run
+
+    def _status(
+        self, what: str, level: bytes, message: str, values: Iterable[tuple[str, str]] = ()
+    ) -> DiagnosticStatus:
+        name = self.get_fully_qualified_name()
+        return DiagnosticStatus(
             level=level,
-            name=f"{self.get_fully_qualified_name()}: {what}",
+            name=f"{name}: {what}",
             message=message,
-            hardware_id=self.get_fully_qualified_name(),
+            hardware_id=name,
             values=[KeyValue(key=key, value=value) for key, value in values],
         )
-        array = DiagnosticArray(status=[status])
-        for key, part in to_time(stamp_ns).items():
-            setattr(array.header.stamp, key, part)
-        self._diagnostics.publish(array)
+
+    def _tell_health(self, stamp_ns: int, without_stamp: bytes) -> None:
+        self._publish_health(clock_to_cdr(stamp_ns) + without_stamp)
+
+
+def _without_stamp(statuses: list[DiagnosticStatus]) -> bytes:
+    """Serialised ``DiagnosticArray`` without what `clock_to_cdr` writes before it."""
+    return bytes(serialize_message(DiagnosticArray(status=statuses))[_STAMP_BYTES:])
 
 
 class CorridorNode(CorridorMixin, Node):  # type: ignore[misc]

@@ -41,7 +41,7 @@ class CorridorPublisher:
             self._line = line = delivery.line(publisher.topic_name)
             line.writers += 1
             # What is kept for those who come later is kept by the middleware.
-            selective = topic.qos is STREAM or (delivery.alone and topic.qos is ESTIMATE)
+            selective = topic.qos is STREAM or topic.qos is ESTIMATE
             send = self._local_sender(sink, delivery, line, selective=selective)
         #: Sends a message, or its serialised form.
         self.send: Send = send
@@ -77,6 +77,12 @@ class CorridorPublisher:
     def publish(self, message: Any) -> None:
         """Publish a message of ROS, or its serialised form."""
         self.send(message if isinstance(message, bytes) else serialize_message(message))
+
+    @property
+    def topic_name(self) -> str:
+        """Absolute name of the topic, after the node's remapping rules."""
+        name: str = self._publisher.topic_name
+        return name
 
     def get_subscription_count(self) -> int:
         """Number of subscriptions that the publisher is connected to, here and outside."""

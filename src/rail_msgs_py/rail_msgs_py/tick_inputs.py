@@ -187,6 +187,8 @@ class TickInputs:
             if self._watch is not None:
                 self._watch.end()
             stamp_ns, items = inbox.take()
+            if self._first is None:
+                self._node.at_tick(stamp_ns)
             self._step(stamp_ns, items)
             if second is not None:
                 second._begin_leg(stamp_ns)

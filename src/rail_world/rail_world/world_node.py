@@ -2,7 +2,8 @@
 
 Topics out: ``/clock``, ``/world/state``, ``/world/<train>/odometry``, ``/world/<track>/path``,
 ``/world/markers``, ``/world/scenario``, ``/world/finished``, ``/<train>/odometer``. Topics in:
-``<sink>/done``, ``/<train>/<supervision>/command``, ``/report/observed``, ``/ready``, ``/failed``.
+``<sink>/done``, ``/<train>/<supervision>/command``, ``/report/observed``, ``/ready``, ``/waiting``,
+``/failed``.
 """
 
 from __future__ import annotations
@@ -26,7 +27,16 @@ from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
 from rail_msgs_py.table import values_from_cdr
 from rail_msgs_py.tick_node import TickNode
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
-from rail_msgs_py.topics.tick import CLOCK, DONE, FAILED, FINISHED, OBSERVED, READY
+from rail_msgs_py.topics.tick import (
+    CLOCK,
+    DONE,
+    FAILED,
+    FINISHED,
+    NO_READER,
+    OBSERVED,
+    READY,
+    WAITING,
+)
 from rail_msgs_py.topics.world import (
     COMMAND,
     CORRIDOR_MARKERS,
@@ -44,6 +54,8 @@ from rail_world.trains.wheels import Wheels, wheel_errors
 from .world_file import read_world_file
 
 _NOT_RECEIVED = DriveCommand(emergency_brake=True)
+#: Wall time of a tick that nobody answers any longer [s]: who comes back must be able to follow.
+_UNANSWERED_S = 0.001
 
 
 @dataclass(frozen=True)
@@ -68,7 +80,7 @@ class WorldParameters:
     observed: bool = parameter(False, "whether to stay within reach of the report")
     timeout_s: float = GIVE_UP.but(default=5.0).parameter()
     start_timeout_s: float = parameter(
-        60.0, "wall time to wait for the nodes at the start", unit="s", low=0.1, high=3600.0
+        60.0, "wall time without a sign of a node at the start", unit="s", low=0.1, high=7200.0
     )
 
 
@@ -83,9 +95,12 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._traffic = Traffic(described.trains, network, described.tick_s)
         self._stops = described.stops
         self._tick = -1
-        self._begun_s = self._started_s = self._created_s = self.steady_s()
+        self._begun_s = self._started_s = self.steady_s()
+        self._sign_s: float | None = None
         self._observed_ns = 0
         self._missing = {*self._p.nodes, self.get_fully_qualified_name()}
+        self._waiting: dict[str, tuple[tuple[str, str], ...]] = {}
+        self._absent: set[str] = set()
         self._finished = False
         names = self._traffic.names
         self._clock_publisher = self.publisher(CLOCK)
@@ -124,6 +139,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         if self._p.observed:
             self.listen(OBSERVED, self._on_observed)
         self.listen(READY, self._on_ready)
+        self.listen(WAITING, self._on_waiting)
         self.listen(FAILED, self._on_failed_before_start)
         for name, track in network.tracks.items():
             self.publisher(CORRIDOR_PATH, track=name).publish(path_of(track))
@@ -132,23 +148,75 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._pace: Any = None
         self._watch_timer = self.every(WATCH_PERIOD_S, self._check)
         self.await_connection(
-            lambda: self._clock_publisher.get_subscription_count() >= self._p.clock_readers
+            lambda: self._clock_publisher.get_subscription_count() >= self._p.clock_readers,
+            CLOCK.name(),
+            NO_READER,
         )
 
     # Before the first tick ---------------------------------------------------------------
 
     def _on_ready(self, message: Any) -> None:
+        self._sign_s = self.steady_s()
         self._missing.discard(message.data)
         self._start_if_ready()
 
+    def _on_waiting(self, message: Any) -> None:
+        self._sign_s = self.steady_s()
+        self._waiting[message.name] = tuple((pair.key, pair.value) for pair in message.values)
+
     def _on_failed_before_start(self, message: Any) -> None:
-        self._missing.discard(message.name)
-        self._start_if_ready()
+        if self._tick < 0:
+            self._absent.add(message.name)
+            self._missing.discard(message.name)
+            self._start_if_ready()
 
     def _start_if_ready(self) -> None:
         if self._tick < 0 and not self._missing:
-            self._started_s = self.steady_s()
-            self._next_tick()
+            self._start()
+
+    def _start(self) -> None:
+        self._started_s = self.steady_s()
+        self._next_tick()
+
+    def _wait_for_the_start(self, now_s: float) -> None:
+        """Begin without those that have failed, once all others have what is left to connect to.
+
+        The wait begins when this node is spun, and again with every sign of another.
+        """
+        if self._sign_s is None:
+            self._sign_s = now_s
+        itself = self.get_fully_qualified_name()
+        if itself in self._missing:
+            self._waiting[itself] = tuple((one.topic, one.lacks) for one in self.lacking())
+        silent = self._missing - self._waiting.keys()
+        if self._absent and not silent and all(map(self._nobody_left, self._missing)):
+            self._start()
+        elif now_s - self._sign_s > self._p.start_timeout_s:
+            self._sign_s = now_s
+            if silent:
+                self._watch.name(sorted(silent), self._p.start_timeout_s)
+                self._absent |= silent
+                self._missing -= silent
+                return
+            for node in sorted(self._missing):
+                topics = ", ".join(sorted({topic for topic, _ in self._waiting[node]}))
+                text = f"begins although {node} waits for {topics}"
+                self.report(DiagnosticStatus.WARN, f"start of {node}", text)
+            self._start()
+
+    def _nobody_left(self, node: str) -> bool:
+        """Whether what a node waits for can only have been of those that have failed."""
+        for topic, lacks in self._waiting[node]:
+            if topic == CLOCK.name() and node == self.get_fully_qualified_name():
+                connected = self._clock_publisher.get_subscription_count()
+                left = self.count_subscribers(topic) - connected
+            elif lacks == NO_READER:
+                left = self.count_subscribers(topic)
+            else:
+                left = self.count_publishers(topic)
+            if left > 0:
+                return False
+        return True
 
     # Ticks -------------------------------------------------------------------------------
 
@@ -169,8 +237,9 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         if stamp_ns % NANOSECONDS < self._tick_ns:
             self._publish_truth(stamp_ns)
         self._publish_odometers(stamp_ns)
+        self.at_tick(stamp_ns)
         self._begin_tick(clock_to_cdr(stamp_ns))
-        if not self._inbox.ports:
+        if not self._inbox.awaits_anything:
             self._tick_over()
 
     def _stopped(self, tick: int) -> dict[str, DriveCommand]:
@@ -218,8 +287,8 @@ class WorldNode(TickNode[WorldParameters], name="world"):
     def _advance(self) -> None:
         while self._inbox.complete:
             stamp_ns, items = self._inbox.take()
-            self._obey(items)
             if stamp_ns == self._tick * self._tick_ns:
+                self._obey(items)
                 self._tick_over()
 
     def _obey(self, items: Mapping[str, DriveCommand | None]) -> None:
@@ -229,6 +298,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
 
     def _tick_over(self) -> None:
         self._begun_s = float("inf")
+        self._inbox.close(self._tick * self._tick_ns)
         wait_s = self._wait_s()
         if wait_s <= 0.0:
             self._next_tick()
@@ -248,10 +318,10 @@ class WorldNode(TickNode[WorldParameters], name="world"):
 
     def _wait_s(self) -> float:
         """Wall time until the next tick may start."""
-        wait_s = 0.0
+        wait_s = 0.0 if self._inbox.awaits_anything else _UNANSWERED_S
         if self._p.rate > 0.0:
             due_s = self._started_s + (self._tick + 1) * self._tick_ns * 1e-9 / self._p.rate
-            wait_s = due_s - self.steady_s()
+            wait_s = max(wait_s, due_s - self.steady_s())
         ahead = (self._tick + 1) * self._tick_ns - self._observed_ns
         if self._p.observed and ahead > OBSERVER_WINDOW_TICKS * self._tick_ns:
             wait_s = max(wait_s, 0.005)
@@ -272,10 +342,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
     def _check(self) -> None:
         now_s = self.steady_s()
         if self._tick < 0:
-            if now_s - self._created_s > self._p.start_timeout_s and self._missing:
-                self._watch.name(sorted(self._missing), self._p.start_timeout_s)
-                self._missing.clear()
-                self._start_if_ready()
+            self._wait_for_the_start(now_s)
             return
         if now_s - self._begun_s > self._p.timeout_s:
             # Nothing of the tick may have come, so the inbox cannot tell the stamp by itself.
@@ -293,8 +360,11 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._inbox.drop(sinks)
         if self._tick < 0 or self._begun_s == float("inf"):
             return
-        if self._inbox.complete or not self._inbox.awaits_anything:
-            self._obey(self._inbox.take()[1] if self._inbox.stamp_ns is not None else {})
+        tick = self._tick
+        self._advance()
+        under_way = self._tick == tick and self._begun_s != float("inf")
+        if under_way and not self._inbox.awaits_anything:
+            self._obey({})
             self._tick_over()
 
 

@@ -145,6 +145,13 @@ def run(
         Path | None,
         typer.Option("--record", help="Record every topic.", metavar="FILE.mcap"),
     ] = None,
+    allow_failures: Annotated[
+        bool,
+        typer.Option(
+            "--allow-failures",
+            help="Exit code 0 although nodes failed that were not killed by --kill.",
+        ),
+    ] = False,
     switches: Annotated[
         bool | None,
         typer.Option(
@@ -188,6 +195,7 @@ def run(
         kills,
         record,
         rate > 0.0 if switches is None else switches,
+        allow_failures,
     )
     raise typer.Exit(run_corridor(loaded, options, Console()))
 

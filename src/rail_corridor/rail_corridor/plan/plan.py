@@ -149,6 +149,7 @@ def make_plan(
         "observed": observed,
         "end_when_arrived": scenario.end_when_arrived,
         "timeout_s": timeout_s,
+        "start_timeout_s": 2.0 * timeout_s,
     }
     return Plan(
         scenario.name,

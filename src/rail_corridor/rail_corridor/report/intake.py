@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.serialization import deserialize_message
 
 from rail_corridor.plan.plan import Plan
 from rail_corridor.run_data import Decoder, EventRecord, Record, RunData
@@ -53,6 +54,12 @@ class Reader:
         return self.topic.name(**self.parts)
 
 
+def names_read(plan: Plan) -> frozenset[str]:
+    """Names of the topics that a report reads, other than those that are kept for it."""
+    ports = (spec.topic.name(**parts) for spec in plan.records for _, parts, _ in spec.ports())
+    return frozenset((DIAGNOSTICS.name(), *ports))
+
+
 class Intake:
     """Reads the messages of a run.
 
@@ -69,12 +76,16 @@ class Intake:
         self.recording = RunData(trains, tuple(world.tracks), STATE, plan.records)
         self._failures: dict[str, tuple[float, str, str]] = {}
         self._events: list[dict[str, Any]] = []
+        self._health: dict[str, tuple[bytes, str]] = {}
+        #: Newest message on health of each node, without its stamp.
+        self._said: dict[str, bytes] = {}
+        self._standing: set[bytes] = set()
         self.finished_ticks: int | None = None
         #: Wall time of the first and of the last tick [s].
         self.first_tick_s = self.last_tick_s = math.nan
         self.readers: list[Reader] = [
             Reader(FAILED, {}, self.take_failed, raw=False),
-            Reader(DIAGNOSTICS, {}, self._take_diagnostics, raw=False),
+            Reader(DIAGNOSTICS, {}, self._take_diagnostics),
             Reader(FINISHED, {}, self._take_finished, raw=False),
         ]
         self.readers += [
@@ -129,8 +140,18 @@ class Intake:
         seen = (round(time_s, 3), values.get("detected_by", ""), message.message)
         self._failures[message.name] = min(seen, self._failures.get(message.name, seen))
 
-    def _take_diagnostics(self, message: Any) -> None:
+    def _take_diagnostics(self, raw: bytes) -> None:
+        """Note what has changed; nodes repeat the rest in every second."""
+        said = bytes(raw[12:])
+        if said in self._standing:
+            return
+        message = deserialize_message(raw, DIAGNOSTICS.type)
         for status in message.status:
+            self._standing.discard(self._said.get(status.hardware_id, b""))
+            self._said[status.hardware_id] = said
+            if self._health.get(status.name) == (status.level, status.message):
+                continue
+            self._health[status.name] = (status.level, status.message)
             if len(self._events) < _MOST_EVENTS:
                 self._events.append(
                     {
@@ -140,6 +161,7 @@ class Intake:
                         "message": status.message,
                     }
                 )
+        self._standing.add(said)
 
     def _take_finished(self, message: Any) -> None:
         self.finished_ticks = to_ns(message.stamp) // self._tick_ns + 1

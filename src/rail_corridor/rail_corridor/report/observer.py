@@ -111,6 +111,7 @@ class Observer(CorridorNode):
             intake.last_tick_s = now_s
             take(raw)
             tick = self.tick - 1
+            self.at_tick(max(tick, 0) * self._tick_ns)
             of_a_second = tick * self._tick_ns % NANOSECONDS < self._tick_ns
             if of_a_second and self._markers.get_subscription_count():
                 self._publish_markers(tick - 1)

@@ -50,7 +50,8 @@ def report_of(
         report = Path(directory) / "report.json"
         scenario.write_text(json.dumps(data))
         command = [sys.executable, "-m", "rail_corridor.cli.main", "run", str(scenario)]
-        command += ["--processes", "one", "--report", str(report), *arguments]
+        command += ["--processes", "one", "--report", str(report), "--allow-failures"]
+        command += arguments  # whoever asks judges the failures
         environment = dict(os.environ)
         if domain is not None:
             environment["ROS_DOMAIN_ID"] = str(domain)

@@ -16,7 +16,7 @@ from rail_corridor.equipment.registry import kind_of
 from rail_msgs_py.message_definition import message_class, message_definition
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.tap import Sink
-from rail_msgs_py.topics.tick import READY
+from rail_msgs_py.topics.tick import FAILED, NO_SENDER, READY
 from rail_msgs_py.topics.topic import Topic
 
 NAME: Final = "bystander"
@@ -57,6 +57,7 @@ class ExternalTrafficRecorder(CorridorNode):
         for topic in shared:
             self._hear(topic, topic.name())
         self.listen(READY, lambda message: self._present.add(message.data))
+        self.listen(FAILED, self._on_failed)
         self._poll_timer = self.every(_POLL_S, self._poll)
         self.announce_when_connected(lambda: not self._polls)
 
@@ -64,6 +65,10 @@ class ExternalTrafficRecorder(CorridorNode):
     def connected(self) -> bool:
         """Whether it hears all of them."""
         return not self._connections
+
+    def _on_failed(self, message: Any) -> None:
+        """Wait no longer for a node that is not coming."""
+        self._polls.pop(message.name, None)
 
     def _poll(self) -> None:
         """Look for topics of the nodes that have said that they are ready."""
@@ -111,4 +116,4 @@ class ExternalTrafficRecorder(CorridorNode):
         )
         self.create_subscription(topic.type, name, self.guarded(sink), everything, raw=True)
         if topic.qos.durability == DurabilityPolicy.VOLATILE:  # what was said before is lost
-            self._connections.append(lambda: self.count_publishers(name) > 0)
+            self.await_connection(lambda: self.count_publishers(name) > 0, name, NO_SENDER)

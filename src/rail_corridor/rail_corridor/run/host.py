@@ -6,7 +6,8 @@ import gc
 import os
 import signal
 import threading
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rail_corridor.equipment.node_spec import NodeSpec
@@ -34,20 +35,37 @@ def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:
     return node
 
 
-def make_nodes(specs: Sequence[NodeSpec], context: Any, *, switches: bool = False) -> list[Any]:
+def make_nodes(
+    specs: Sequence[NodeSpec],
+    context: Any,
+    *,
+    switches: bool = False,
+    until: Callable[[], bool] = lambda: False,
+) -> list[Any]:
     """Create the nodes of one process; many of them go without services.
 
-    With ``switches`` they keep those that switch equipment off and on.
+    With ``switches`` they keep those that switch equipment off and on. Once ``until`` says so
+    no more are made.
     What is there by then stays: no need to look through it for garbage again.
     """
     services: Any = len(specs) <= MOST_NODES_WITH_SERVICES or (switches and "switches")
-    nodes = [make_node(spec, context, services) for spec in specs]
+    nodes = []
+    for spec in specs:
+        if until():
+            break
+        nodes.append(make_node(spec, context, services))
     gc.collect()
     gc.freeze()
     return nodes
 
 
-def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None, *, switches: bool = False) -> None:
+def run_nodes(
+    specs: Sequence[NodeSpec],
+    tap: Tap | None = None,
+    *,
+    switches: bool = False,
+    report_reads: frozenset[str] = frozenset(),
+) -> None:
     """Make nodes in this process and spin them until SIGTERM.
 
     Parameters
@@ -57,13 +75,16 @@ def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None, *, switches: bo
         Is told of everything that they publish.
     switches : bool
         As of `make_nodes`.
+    report_reads : frozenset of str
+        Names of the topics that a report in another process reads: its ear must be open before
+        their nodes are ready.
     """
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
     from rail_msgs_py.standalone import spin
 
-    context = make_context(tap)
+    context = make_context(tap, report_reads)
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     nodes = make_nodes(specs, context, switches=switches)
     try:
@@ -74,11 +95,25 @@ def run_nodes(specs: Sequence[NodeSpec], tap: Tap | None = None, *, switches: bo
         rclpy.try_shutdown(context=context)
 
 
-def make_context(tap: Tap | None, *, alone: bool = False) -> Any:
-    """Context of the nodes of a process; ``alone`` as of `LocalDelivery`."""
+def destroy_nodes(nodes: Iterable[Any], within_s: float) -> bool:
+    """Destroy nodes, as many as can be in a time; whether that was all of them.
+
+    The middleware looks for the counterparts of each publisher and subscription among all those of
+    the process: some thousands of them take several seconds.
+    """
+    deadline_s = time.monotonic() + within_s
+    for node in nodes:
+        if time.monotonic() > deadline_s:
+            return False
+        node.destroy_node()
+    return True
+
+
+def make_context(tap: Tap | None, report_reads: frozenset[str] = frozenset()) -> Any:
+    """Context of the nodes of a process; ``report_reads`` as of `CorridorContext`."""
     from rail_msgs_py.context import CorridorContext
 
-    return CorridorContext(tap, alone=alone)
+    return CorridorContext(tap, report_reads)
 
 
 def die_with(lifeline: int) -> None:

@@ -6,6 +6,7 @@ import gc
 import os
 import shutil
 import signal
+import sys
 import tempfile
 from dataclasses import dataclass
 from functools import partial
@@ -31,12 +32,13 @@ from rail_corridor.plan.plan import (
 )
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
+from rail_corridor.report.intake import names_read
 from rail_corridor.report.report import make_report, print_report, report_text, write_report
 from rail_corridor.scenario.model import Scenario
 
 from .external_traffic import FULL_NAME as EXTERNAL_TRAFFIC
 from .external_traffic import ExternalTrafficRecorder
-from .host import make_context, make_nodes, run_nodes
+from .host import destroy_nodes, make_context, make_nodes, run_nodes
 from .kills import FaultInjector, Kill, check_kills
 from .parameter_services import ParameterServicesOnDemand
 from .processes import ProcessGroup, remove_orphaned_segments
@@ -52,6 +54,12 @@ MOST_PROCESSES_PER_CORE = 8
 DRAIN_S = 20.0
 #: ... and where some of it will not come, as its sender has failed or the run was stopped.
 SETTLE_S = 0.3
+#: Wall time for the nodes of this process to leave, after a signal.
+LEAVE_S = 0.5
+#: Wall time between two looks at whether the other half of a corridor is there.
+_LOOK_S = 0.5
+#: Exit codes: the other half of a corridor has ended first; nodes have failed.
+HALF_GONE, NODES_FAILED = 3, 4
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,7 @@ class RunOptions:
     kills: tuple[Kill, ...] = ()
     record: Path | None = None
     switches: bool = False
+    allow_failures: bool = False
 
     @property
     def with_external_nodes(self) -> bool:
@@ -80,8 +89,9 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
     Returns
     -------
     int
-        Exit code: 0, 1 if the world itself or the recorder failed, 128 + the number of the signal
-        that ended it.
+        Exit code: 0, 1 if the world itself or the recorder failed, 3 if the other half of a split
+        corridor ended first, 4 if nodes failed that were not meant to, 128 + the number of the
+        signal that ended it.
     """
     if options.record is not None:
         _check_recording(options.record, options.only)
@@ -101,9 +111,15 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
         )
         check_external(plan, options.external)
         with sole_corridor(options.only):
-            return _LaunchedRun(scenario, options, plan, console).run()
+            launched = _LaunchedRun(scenario, options, plan, console)
+            code = launched.run()
     finally:
         shutil.rmtree(directory, ignore_errors=True)
+    if launched.nodes_left:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
 
 
 def _check_recording(path: Path, only: str | None) -> None:
@@ -138,10 +154,17 @@ class _LaunchedRun:
         if placement != "one":
             self._here.clear()
         check_kills(options.kills, self._groups, WORLD, one=bool(self._here))
+        self._report_reads = names_read(plan)
         self._recording: RunRecording | None = None
         self._recording_failed = False
         self._signal = 0
         self._world_failed = False
+        #: Whether some nodes of this process could not be destroyed in time: it must not tidy up.
+        self.nodes_left = False
+        ours = {spec.name for specs in self._groups.values() for spec in specs}
+        self._others = {spec.name for spec in plan.nodes} - ours - {*options.external}
+        self._half_seen = self._half_gone = False
+        self._looked_s = 0.0
         self._observer: Any = None
         self._progress: Progress | None = None
         self._bar: TaskID | None = None
@@ -185,7 +208,7 @@ class _LaunchedRun:
     def _child(self, name: str, specs: list[NodeSpec]) -> None:
         """In a process of its own: run nodes, and tell the recorder what they publish."""
         tap = self._recording.tap_of(name) if self._recording else None
-        run_nodes(specs, tap, switches=self._options.switches)
+        run_nodes(specs, tap, switches=self._options.switches, report_reads=self._report_reads)
 
     def _record(self, path: Path, nodes: int) -> RunRecording:
         """Start the recorder, before any other process and before ROS."""
@@ -217,8 +240,9 @@ class _LaunchedRun:
         from rail_msgs_py.standalone import FOREVER_S
 
         tap = self._recording.start() if self._recording else None
-        alone = bool(self._here) and not self._options.with_external_nodes
-        context = make_context(tap, alone=alone)
+        # Of a half without a report, that which reads it is on the other host.
+        elsewhere = self._options.only == "onboard"
+        context = make_context(tap, self._report_reads if elsewhere else frozenset())
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
         self._stop = Future()
         self._observer = Observer(
@@ -227,7 +251,12 @@ class _LaunchedRun:
             context=context,
             record=self._options.only != "onboard",
         )
-        here = make_nodes(self._here, context, switches=self._options.switches)
+        here = make_nodes(
+            self._here,
+            context,
+            switches=self._options.switches,
+            until=lambda: bool(self._signal),
+        )
         nodes = [self._observer, *here]
         if tap is not None and self._options.with_external_nodes:
             ours = {spec.name for specs in self._groups.values() for spec in specs}
@@ -259,8 +288,9 @@ class _LaunchedRun:
             self._drain(executor)
         executor.shutdown()
         gc.unfreeze()
-        for node in nodes:
-            node.destroy_node()
+        # The other half of a corridor must not take what is left here for living nodes.
+        in_haste = self._signal and not self._options.only
+        self.nodes_left = not destroy_nodes(nodes, LEAVE_S if in_haste else FOREVER_S)
         rclpy.try_shutdown(context=context)
 
     def _arrange_kills(self, executor: Any, nodes: list[Any]) -> None:
@@ -294,7 +324,7 @@ class _LaunchedRun:
         if self._options.only == "onboard":
             return
         observer = self._observer
-        stopped = bool(self._signal) or self._world_failed
+        stopped = self._interrupted
         ticks = observer.finished_ticks
         if ticks is None:
             ticks = max(observer.tick - 1, 0)
@@ -323,7 +353,9 @@ class _LaunchedRun:
             self._tell_trouble(self._recording.trouble(), "; the run goes on")
         if stop.done():
             return
-        if observer.finished_ticks is not None or self._world_failed or self._signal:
+        if observer.finished_ticks is None and self._options.only:
+            self._look_for_the_other_half()
+        if observer.finished_ticks is not None or self._interrupted:
             stop.set_result(None)
         if self._progress is None or self._bar is None or not observer.tick:
             return
@@ -332,6 +364,29 @@ class _LaunchedRun:
         elapsed_s = intake.last_tick_s - intake.first_tick_s
         speed = f"{sim_s / elapsed_s:.0f} x real time" if elapsed_s > 0.5 else ""
         self._progress.update(self._bar, description="running", completed=sim_s, speed=speed)
+
+    @property
+    def _interrupted(self) -> bool:
+        """Whether the run has ended before its time."""
+        return bool(self._signal) or self._world_failed or self._half_gone
+
+    def _look_for_the_other_half(self) -> None:
+        """Note that the other half of the corridor has been there and is no longer."""
+        observer = self._observer
+        now_s = observer.steady_s()
+        if now_s - self._looked_s < _LOOK_S:
+            return
+        self._looked_s = now_s
+        names = [
+            f"{space.rstrip('/')}/{n}" for n, space in observer.get_node_names_and_namespaces()
+        ]
+        if names.count(REPORT) > 1 or not self._others.isdisjoint(names):
+            self._half_seen = True
+        elif self._half_seen and not self._half_gone:
+            self._half_gone = True
+            other = "onboard" if self._options.only == "wayside" else "wayside"
+            line = f"the other half of the corridor, {other}, has ended: so does this one"
+            self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)
 
     def _tell_trouble(self, trouble: str | None, so: str = "") -> None:
         if trouble is not None:
@@ -349,7 +404,7 @@ class _LaunchedRun:
             self._observer.intake,
             nodes=nodes,
             processes=len(self._groups),
-            interrupted=bool(self._signal) or self._world_failed,
+            interrupted=self._interrupted,
         )
         if self._recording is not None and not self._recording_failed:
             run_end = RunEnd(report["complete"], report["ticks"], report["wall_time_s"])
@@ -376,4 +431,22 @@ class _LaunchedRun:
             return 1
         if self._signal:
             return 128 + self._signal
-        return 1 if self._recording_failed else 0
+        if self._recording_failed:
+            return 1
+        if self._half_gone:
+            return HALF_GONE
+        return NODES_FAILED if self._unplanned_failures() else 0
+
+    def _unplanned_failures(self) -> bool:
+        """Whether nodes failed that were not meant to; says so, unless that is allowed."""
+        if self._observer is None or self._options.allow_failures:
+            return False
+        killed = {kill.node for kill in self._options.kills}
+        if not self._here:  # with a process all of its nodes are
+            groups = ({spec.name for spec in specs} for specs in self._groups.values())
+            killed |= {name for names in groups if names & killed for name in names}
+        failed = [one["node"] for one in self._observer.failures if one["node"] not in killed]
+        if failed:
+            line = f"not meant to fail: {', '.join(failed)} (--allow-failures for exit code 0)"
+            self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)
+        return bool(failed)

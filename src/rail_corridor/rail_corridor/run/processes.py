@@ -142,7 +142,7 @@ def _how(status: int) -> str:
 def remove_orphaned_segments(
     directory: Path = Path("/dev/shm"), proc: Path = Path("/proc"), besides: int | None = None
 ) -> list[Path]:
-    """Remove shared-memory segments of the middleware that no process has any longer.
+    """Remove shared-memory segments of the middleware that no process, ``besides`` one, has.
 
     A killed process leaves them behind. A segment and its lock file stand or fall together:
     the one is mapped, the other only open.
@@ -154,6 +154,8 @@ def remove_orphaned_segments(
     if not families:
         return []
     for process in proc.glob("[0-9]*"):
+        if process.name == str(besides):
+            continue
         for name in _in_use(process, directory):
             families.pop(name.removesuffix("_el"), None)
     return _removed(path for paths in families.values() for path in paths)

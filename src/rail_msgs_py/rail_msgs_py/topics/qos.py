@@ -24,13 +24,14 @@ STREAM: Final = QoSProfile(
     durability=DurabilityPolicy.VOLATILE,
 )
 
-#: Estimates and truth, once a tick: also read by the report, which may lag by the window, and
-#: may be connected later than the first tick: what it has missed is kept for it.
+#: Estimates and truth, once a tick: also read by the report, which may lag by the window; the
+#: first tick waits for it. Who joins later begins with the newest: the depth is for what is under
+#: way, and a writer that kept its history for late joiners would give them the oldest first.
 ESTIMATE: Final = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=2 * OBSERVER_WINDOW_TICKS,
     reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    durability=DurabilityPolicy.VOLATILE,
 )
 
 #: State that late joiners must learn: the last messages of each publisher are kept for them.

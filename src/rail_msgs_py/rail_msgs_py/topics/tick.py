@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header, String
 
-from .qos import LATCHED, STREAM
+from .qos import ESTIMATE, LATCHED, STREAM
 from .topic import Topic
 
 CLOCK: Final = Topic(
@@ -56,6 +56,18 @@ READY: Final = Topic(
     "world",
     "Name of a node whose topics are all connected.",
 )
+#: What a stream lacks, on ``/waiting``.
+NO_SENDER: Final = "no sender"
+NO_READER: Final = "no reader"
+WAITING: Final = Topic(
+    "/waiting",
+    DiagnosticStatus,
+    LATCHED,
+    None,
+    "every node that is not connected for long",
+    "world",
+    "The topics that a node lacks a sender or a reader of before the first tick.",
+)
 FAILED: Final = Topic(
     "/failed",
     DiagnosticStatus,
@@ -68,11 +80,11 @@ FAILED: Final = Topic(
 DIAGNOSTICS: Final = Topic(
     "/diagnostics",
     DiagnosticArray,
-    LATCHED,
+    ESTIMATE,
     None,
     "every node",
     "people, the report",
-    "Health, published when it changes (REP 107).",
+    "Health, published when it changes and in every simulated second (REP 107).",
 )
 
 #: In the order of the documentation.
@@ -82,6 +94,7 @@ TOPICS: Final[tuple[Topic, ...]] = (
     FINISHED,
     OBSERVED,
     READY,
+    WAITING,
     FAILED,
     DIAGNOSTICS,
 )

@@ -102,6 +102,7 @@ class DopplerPositionerNode(
         self._last_ns: int | None = None
 
     def _on_block(self, stamp_ns: int, received: Waveform | None) -> None:
+        self.at_tick(stamp_ns)
         step_s = 0.0 if self._last_ns is None else (stamp_ns - self._last_ns) / NANOSECONDS
         self._last_ns = stamp_ns
         positioner = self._positioner

@@ -63,6 +63,7 @@ class TrackCodeReceiverNode(
         self._selector = CarrierSelector(p.carriers_hz, p.sample_rate_hz, p.least_level_db)
 
     def _on_block(self, stamp_ns: int, received: Waveform | None) -> None:
+        self.at_tick(stamp_ns)
         values = self._values[0]
         values[:] = 0.0
         if self.switched_on and received is not None:

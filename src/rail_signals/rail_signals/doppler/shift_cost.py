@@ -20,11 +20,11 @@ from .surveyed_line import SurveyedLine
 
 @dataclass(frozen=True)
 class Minimum:
-    """A minimum of the cost, with the curvature of its parabola there."""
+    """A minimum of the cost, and the covariance [3, 3] by its parabola there."""
 
     at: Unknowns
     cost: float
-    normal: Symmetric
+    covariance: FloatArray
 
 
 class ShiftCost:
@@ -65,5 +65,5 @@ class ShiftCost:
 
         None if it is not within the window, its cost is above `worst`, or it is not reached.
         """
-        found, cost, normal = cost_minimum(*self._setting, at, *window_m, worst)
-        return None if isinf(cost) else Minimum(found, cost, normal)
+        found, cost, covariance = cost_minimum(*self._setting, at, *window_m, worst)
+        return None if isinf(cost) else Minimum(found, cost, covariance)

@@ -152,14 +152,14 @@ def cost_minimum(
     low_m: float,
     high_m: float,
     worst: float,
-) -> tuple[Unknowns, float, Symmetric]:
-    """Minimum near a place, its cost and its normal matrix.
+) -> tuple[Unknowns, float, FloatArray]:
+    """Minimum near a place, its cost, and the covariance [3, 3] of its parabola.
 
     The cost is infinite if it is not within the window, costs more than `worst`, or is not
     reached.
     """
     s, v, delta = at
-    normal = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    covariance = np.full((3, 3), inf)
     for _ in range(_MOST_STEPS):
         (ds, dv, dd), cost, normal = newton_step(
             cubics, start_m, per_m, received, tau_s, known, (s, v, delta)
@@ -175,8 +175,13 @@ def cost_minimum(
         short = fraction * abs(ds) < _STEP_M and fraction * abs(dv) < _STEP_MPS
         if there == s and short:
             found = (s, v, delta)
-            return found, shift_cost(cubics, start_m, per_m, received, tau_s, known, found), normal
-    return (s, v, delta), inf, normal
+            cost = shift_cost(cubics, start_m, per_m, received, tau_s, known, found)
+            c00, c01, c02, c11, c12, c22 = inverse(normal)
+            covariance[0] = c00, c01, c02
+            covariance[1] = c01, c11, c12
+            covariance[2] = c02, c12, c22
+            return found, cost, covariance
+    return (s, v, delta), inf, covariance
 
 
 @compiled
@@ -269,18 +274,30 @@ def deepest_minima(cost: FloatArray, most: int) -> tuple[float, NDArray[np.int64
     """Least cost, and places of the deepest minima within, at most so many, deepest first."""
     where = np.empty(most, dtype=np.int64)
     count = 0
-    least = min(cost[0], cost[-1])
+    before, here = cost[0], cost[1]
     for i in range(1, len(cost) - 1):
-        here = cost[i]
-        least = min(least, here)
-        if not (here <= cost[i - 1] and here < cost[i + 1]):
-            continue
-        if count == most and not here < cost[where[most - 1]]:
-            continue
-        slot = count if count < most else most - 1
-        while slot > 0 and here < cost[where[slot - 1]]:
-            where[slot] = where[slot - 1]
-            slot -= 1
-        where[slot] = i
-        count = min(count + 1, most)
+        after = cost[i + 1]
+        lowest = (here <= before) & (here < after)
+        before, here = here, after
+        if lowest:
+            count = _insert(cost, where, count, i)
+    least = min(cost[0], cost[-1])
+    if count:
+        least = min(least, cost[where[0]])
     return least, where[:count]
+
+
+@compiled
+def _insert(cost: FloatArray, where: NDArray[np.int64], count: int, place: int) -> int:
+    """Put a place among the deepest so far, as many as there is room for; their new number."""
+    most, depth = len(where), cost[place]
+    if count == most:
+        if not depth < cost[where[most - 1]]:
+            return count
+        count -= 1
+    slot = count
+    while slot > 0 and depth < cost[where[slot - 1]]:
+        where[slot] = where[slot - 1]
+        slot -= 1
+    where[slot] = place
+    return count + 1

@@ -32,7 +32,7 @@ from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 
 from .shift_cost import ShiftCost
-from .shift_kernel import Symmetric, cost_profile, deepest_minima, inverse
+from .shift_kernel import cost_profile, deepest_minima
 from .surveyed_line import SurveyedLine
 from .tone_plan import TonePlan
 
@@ -294,9 +294,7 @@ class _Measured:
                 best = min(best, here.cost)
         solutions.sort(key=lambda minimum: minimum.cost)
         freedom = len(self._number) + self._informed - 3
-        return [
-            DopplerSolution(*m.at, _full(inverse(m.normal)), m.cost, freedom) for m in solutions
-        ]
+        return [DopplerSolution(*m.at, m.covariance, m.cost, freedom) for m in solutions]
 
     def bent(self, fix: DopplerSolution) -> bool:
         """Whether the cost is no parabola within two sigma, so that the covariance misleads."""
@@ -304,10 +302,6 @@ class _Measured:
         s, v, delta = fix.chainage_m, fix.speed_mps, fix.offset_hz
         sides = (s + ds, v + dv, delta + dd), (s - ds, v - dv, delta - dd)
         return any(abs(self.cost(side) - fix.chi_square - 4.0) > _BENT for side in sides)
-
-
-def _full(c: Symmetric) -> FloatArray:
-    return np.array([[c[0], c[1], c[2]], [c[1], c[3], c[4]], [c[2], c[4], c[5]]])
 
 
 def speed_from_shift(

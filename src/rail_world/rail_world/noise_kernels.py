@@ -11,7 +11,6 @@ Of a block of n numbers, number i is made of half i, its magnitude, and of half 
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np

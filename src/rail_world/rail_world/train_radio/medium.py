@@ -22,7 +22,6 @@ Left out: delay (3.3 us/km; the radios advance their timing), errors of oscillat
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -17,8 +17,16 @@ from rail_signals.compiled import compiled
 _ONE, _HALF = np.float32(1.0), np.float32(0.5)
 _QUARTER_RAD = np.float32(0.5 * math.pi)
 # Moshier, Cephes, 1989: sinf and cosf between -pi/4 and pi/4.
-_S3, _S5, _S7 = np.float32(-1.6666654611e-1), np.float32(8.3321608736e-3), np.float32(-1.9515295891e-4)
-_C4, _C6, _C8 = np.float32(4.1666645683e-2), np.float32(-1.3887316255e-3), np.float32(2.4433157118e-5)
+_S3, _S5, _S7 = (
+    np.float32(-1.6666654611e-1),
+    np.float32(8.3321608736e-3),
+    np.float32(-1.9515295891e-4),
+)
+_C4, _C6, _C8 = (
+    np.float32(4.1666645683e-2),
+    np.float32(-1.3887316255e-3),
+    np.float32(2.4433157118e-5),
+)
 # Added and taken away again, it leaves the nearest whole number, to the even one at a half.
 _WHOLE = 1.5 * 2.0**52
 

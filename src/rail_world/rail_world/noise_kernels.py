@@ -11,7 +11,6 @@ Of a block of n numbers, number i is made of half i, its magnitude, and of half 
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -61,9 +60,7 @@ def placed_words(key: Any, stage: Any, port: Any, tick: Any, first: Any, words: 
 
 
 @compiled
-def _halves(
-    key: Any, stage: Any, port: Any, tick: Any, begin: Any, count: Any, words: Any
-) -> Any:
+def _halves(key: Any, stage: Any, port: Any, tick: Any, begin: Any, count: Any, words: Any) -> Any:
     """Halves ``begin`` to ``begin + count`` of a place, uint32 [count]; ``words`` is room."""
     first = begin // _HALVES
     counters = (begin + count + _HALVES - 1) // _HALVES - first
@@ -126,9 +123,7 @@ def complex_stretch(
 
 
 @compiled
-def complex_blocks(
-    key: Any, stage: Any, ports: Any, tick: Any, sigma: Any, out: Any
-) -> None:
+def complex_blocks(key: Any, stage: Any, ports: Any, tick: Any, sigma: Any, out: Any) -> None:
     """Whole blocks ``out`` float32 [port, 2 n] as of `complex_stretch`; ``sigma`` [port]."""
     for row in range(len(ports)):
         block = out.shape[1] // 2

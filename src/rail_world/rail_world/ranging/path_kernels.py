@@ -23,7 +23,13 @@ def off_axis_db(cos_angle: Any, beamwidth_deg: Any, front_to_back_db: Any) -> An
 
 @compiled
 def links_in_coverage(
-    stations: Any, trains: Any, patterns: Any, exponent: Any, least_m: Any, links: Any, in_coverage: Any
+    stations: Any,
+    trains: Any,
+    patterns: Any,
+    exponent: Any,
+    least_m: Any,
+    links: Any,
+    in_coverage: Any,
 ) -> Any:
     """Fill ``links`` float64 [3, station, train] where a link exists.
 
@@ -95,7 +101,14 @@ def _delay(spectrum: Any, delay_turns: Any, gain: Any, carrier_turns: Any, out: 
 
 @compiled
 def carry(
-    uplink: Any, sent: Any, stations: Any, trains: Any, channels: Any, paths: Any, limits: Any, links: Any
+    uplink: Any,
+    sent: Any,
+    stations: Any,
+    trains: Any,
+    channels: Any,
+    paths: Any,
+    limits: Any,
+    links: Any,
 ) -> Any:
     """What is sent, over every link on which it is audible.
 

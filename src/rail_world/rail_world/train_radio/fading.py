@@ -107,7 +107,15 @@ class FadingLinks:
         slots = [self._slot(piece.base, piece.train) for piece in pieces]
         ends = np.cumsum([len(piece.overlaps) for piece in pieces]).tolist()
         table = [
-            (slot, piece.base, piece.train, piece.begin, piece.sent_at, end - len(piece.overlaps), end)
+            (
+                slot,
+                piece.base,
+                piece.train,
+                piece.begin,
+                piece.sent_at,
+                end - len(piece.overlaps),
+                end,
+            )
             for slot, piece, end in zip(slots, pieces, ends, strict=True)
         ]
         overlaps = [overlap for piece in pieces for overlap in piece.overlaps]

@@ -153,7 +153,8 @@ class RadioMedium:
             *(self.description.path_loss_exponent, _MIN_DISTANCE_M),
             *(links, in_coverage),
         )
-        return Paths(*links, in_coverage, trains.position_m, axis, count)
+        distance_m, closing_mps, gain_db = links
+        return Paths(distance_m, closing_mps, gain_db, in_coverage, trains.position_m, axis, count)
 
     def dead_stations(self, time_s: float) -> set[int]:
         """Indices of station antennas that are dead at ``time_s``."""
@@ -233,7 +234,7 @@ class RadioMedium:
         table = np.empty((paths.links, 5), dtype=np.int64)
         values = np.empty((paths.links, 2))
         arrived = np.empty((paths.links, spectra.shape[1]), dtype=np.complex128)
-        count, port_count = carry(
+        count, _ = carry(
             uplink,
             (row_of, channel, periods, np.array([block.power_mw for block in sent]), spectra),
             (

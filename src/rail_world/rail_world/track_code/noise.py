@@ -18,7 +18,8 @@ class RealNoiseSource:
     """Real noise that depends on nothing but (seed, stage, port, tick).
 
     The real sister of `rail_world.ranging.noise.NoiseSource`, on a stream of its own. One 64-bit
-    word makes two normals (Box and Muller, 1958), in single precision; the tails reach to 6.6 sigma.
+    word makes two normals (Box and Muller, 1958), in single precision; the tails reach to
+    6.6 sigma.
 
     Parameters
     ----------

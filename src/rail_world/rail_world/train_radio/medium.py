@@ -266,9 +266,10 @@ class CbtcMedium:
                 for burst in bursts:
                     self._check(burst, direction)
                     on_air.add(base, train, burst, placed)
+        sent = on_air.sent()
         # In the order of lengths: a sum must not depend on what other ports hear.
         for count, pieces in sorted(on_air.pieces.items()):
-            self._fading[direction].add(links, pieces, count, on_air.sent, heard)
+            self._fading[direction].add(links, pieces, count, sent, heard)
         return received
 
     def _noise_mw(self, links: Links, channel: int) -> float:
@@ -325,9 +326,10 @@ class _OnAir:
                 piece = Piece(base, train, begin, place + begin - burst.start, overlaps)
                 self.pieces.setdefault(end - begin, []).append(piece)
 
-    @property
     def sent(self) -> NDArray[np.float32]:
         """All that is sent [part, antenna, sample]."""
+        if not self._bursts:
+            return np.empty((2, 0, 0), dtype=np.float32)
         samples = np.concatenate([burst.samples for burst in self._bursts], axis=1)
         return np.array((samples.real, samples.imag), dtype=np.float32)
 

@@ -56,6 +56,10 @@ class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", names
             for index, train in enumerate(radio.trains)
             for channel in radio.downlink_hz
         }
+        self._windows = {
+            (train, channel): (self._span(0), self._span(1 + train))
+            for train, channel in self._train_out
+        }
         self._links = self.table_out(CBTC_LINKS, radio.trains)
         self._silence_down = self._silences(radio.downlink_hz)
         self._silence_up = self._silences(radio.uplink_hz)
@@ -92,15 +96,12 @@ class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", names
         length = self._p.burst_samples
         sent = {}
         for base, block in blocks.items():
-            slots = range(block.shape[1] // length)
-            parts = [(first, block[:, first:end]) for first, end in map(self._span, slots)]
+            slots = block.shape[1] // length
+            used = block[:, : slots * length].reshape(len(block), slots, length).any(axis=(0, 2))
+            spans = map(self._span, np.flatnonzero(used).tolist())
             antennas = self._radio.base_antennas
-            sent[base] = [_burst(first, part, antennas) for first, part in parts if part.any()]
-        windows = {
-            (train, channel): (self._span(0), self._span(1 + train))
-            for train, channel in self._train_out
-        }
-        received = self._medium.downlink(links, sent, windows)
+            sent[base] = [_burst(first, block[:, first:end], antennas) for first, end in spans]
+        received = self._medium.downlink(links, sent, self._windows)
         for key, publish in self._train_out.items():
             channel = key[1]
             if key not in received:

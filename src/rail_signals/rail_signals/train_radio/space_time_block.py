@@ -180,25 +180,23 @@ def _combined(y: ComplexArray, h: ComplexArray, symbols: ComplexArray, gain: Flo
             if transmit == 1:
                 for i in range(count):
                     x[i] += h1[i].conjugate() * z[i]
-                    g[i] += h1[i].real ** 2 + h1[i].imag ** 2
+                    g[i] += _power(h1[i])
             else:
                 for i in range(0, count, 2):
                     early, late = z[i], z[i + 1].conjugate()
                     x[i] += h1[i].conjugate() * early + h2[i + 1] * late
                     x[i + 1] += h2[i].conjugate() * early - h1[i + 1] * late
-                    g[i] += (h1[i].real ** 2 + h1[i].imag ** 2) + (
-                        h2[i + 1].real ** 2 + h2[i + 1].imag ** 2
-                    )
-                    g[i + 1] += (h2[i].real ** 2 + h2[i].imag ** 2) + (
-                        h1[i + 1].real ** 2 + h1[i + 1].imag ** 2
-                    )
+                    g[i] += _power(h1[i]) + _power(h2[i + 1])
+                    g[i + 1] += _power(h2[i]) + _power(h1[i + 1])
         for i in range(count):
             g[i] *= power
-            x[i] = (
-                complex(x[i].real * amplitude / g[i], x[i].imag * amplitude / g[i])
-                if g[i] > 0.0
-                else 0j
-            )
+            scale = amplitude / g[i] if g[i] > 0.0 else 0.0
+            x[i] = complex(x[i].real * scale, x[i].imag * scale)
+
+
+@compiled
+def _power(gain: complex) -> float:
+    return gain.real**2 + gain.imag**2
 
 
 _SCHEMES: Final = {

@@ -10,8 +10,8 @@ windows, noise, CRC and confirmation, and watches for a change of the word; each
 decisions is compared with that of `ReferenceTrackCodeReceiver` before anything is timed. GNU Radio
 runs twice: alone, which is the peer, and as front end of one NumPy product, which is told.
 
-The bound is the time of the matrix products alone - filters, tones, residuals - in pieces that stay in
-the cache, and of one reading of the samples: no discriminator, no decisions, no checks.
+The bound is the time of the matrix products alone - filters, tones, residuals - in pieces that stay
+in the cache, and of one reading of the samples: no discriminator, no decisions, no checks.
 
 CPU time of one process is counted; matrix products use one thread. Each round takes the middle
 of a few passes on each side, the figure is the median of the rounds.

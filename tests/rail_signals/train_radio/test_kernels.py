@@ -18,7 +18,7 @@ from rail_signals.train_radio.pilot_estimation import (
     _levels,
 )
 from rail_signals.train_radio.pulse import matched_filter, root_raised_cosine, shape_pulses
-from rail_signals.train_radio.space_time_block import Scheme, _combined, scheme
+from rail_signals.train_radio.space_time_block import Scheme, _combined, _encoded, scheme
 from rail_signals.train_radio.symbol_mapping import constellation
 
 SCHEMES = ["siso", "mrc", "alamouti_2x1", "alamouti_2x2"]
@@ -163,6 +163,7 @@ def test_compiled_and_plain_python_are_one() -> None:
             (np.zeros(3, dtype=np.intp), np.zeros((2, 3))),
         ),
         (_channels, (pilots, weight, vectors, rows), (np.zeros((3, 2, 12)),)),
+        (_encoded, (y[0],), (np.zeros((2, 2, 6), dtype=np.complex128),)),
         (_combined, (y, h), (np.zeros((3, 6), dtype=np.complex128), np.zeros((3, 6)))),
     ):
         plain = tuple(result.copy() for result in results)

@@ -91,12 +91,9 @@ class Scheme:
         if self.transmit == 1:
             return np.array(x[..., None, :])
         sent = np.empty((*x.shape[:-1], 2, x.shape[-1]), dtype=np.complex128)
-        first, second = x[..., 0::2], x[..., 1::2]
-        sent[..., 0, 0::2] = first
-        sent[..., 0, 1::2] = -second.conj()
-        sent[..., 1, 0::2] = second
-        sent[..., 1, 1::2] = first.conj()
-        sent *= math.sqrt(self.antenna_power)
+        _encoded(
+            np.ascontiguousarray(x).reshape(-1, x.shape[-1]), sent.reshape(-1, *sent.shape[-2:])
+        )
         return sent
 
     def combine(self, received: ArrayLike, channel: ArrayLike) -> tuple[ComplexArray, FloatArray]:
@@ -154,6 +151,18 @@ class Scheme:
                 f"{name} must have whole blocks of {self.transmit} on its last axis,"
                 f" got shape {shape}"
             )
+
+
+@compiled
+def _encoded(x: ComplexArray, sent: ComplexArray) -> None:
+    """Code of eq. 1: symbols complex128 [burst, n] to the antennas' [burst, 2, n], the result."""
+    amplitude = math.sqrt(0.5)
+    for burst in range(len(x)):
+        first, second = sent[burst]
+        for i in range(0, x.shape[1], 2):
+            a, b = x[burst, i] * amplitude, x[burst, i + 1] * amplitude
+            first[i], first[i + 1] = a, -b.conjugate()
+            second[i], second[i + 1] = b, a.conjugate()
 
 
 @compiled

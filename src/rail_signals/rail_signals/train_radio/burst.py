@@ -180,8 +180,10 @@ class RadioBurstFormat:
         if values.ndim == 0 or values.shape[-1] != self.data_bits:
             raise ValueError(f"bits must be [..., {self.data_bits}], got shape {values.shape}")
         room = self.pattern.data_symbols * self.constellation.bits_per_symbol
-        fill = np.zeros((*values.shape[:-1], room - self.data_bits), dtype=values.dtype)
-        symbols = self.constellation.modulate(np.concatenate([values, fill], axis=-1))
+        if room > self.data_bits:
+            fill = np.zeros((*values.shape[:-1], room - self.data_bits), dtype=values.dtype)
+            values = np.concatenate([values, fill], axis=-1)
+        symbols = self.constellation.modulate(values)
         burst = self.pattern.insert(self.scheme.encode(symbols))
         wave = np.empty((*burst.shape[:-1], self.samples), dtype=np.complex128)
         shape_pulses(_parts(burst), self.pulse, self._rows(wave))

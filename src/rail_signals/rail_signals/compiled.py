@@ -1,27 +1,105 @@
 """Kernels that are compiled: where a measurement says that NumPy's calls cost more than the work.
 
 A compiled kernel is written in plain Python on arrays and numbers. Its machine code is made at
-the first call, kept beside the source, and found there by every later start. ``kernel.py_func`` is
-the pure form, which tests compare it with. Decision and measurements:
-``docs/adr/0013-compiled-kernels.md``.
+the first call, kept in ``__pycache__`` beside the source, and found there by every later start.
+``kernel.py_func`` is the pure form, which tests compare it with. Decision and measurements:
+``docs/adr/0015-compiled-kernels.md``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+import functools
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
-import numba
-
-Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def compiled(function: Kernel) -> Kernel:
+def compiled(function: Function) -> Function:
     """Decorator: compile a kernel, without the interpreter's lock while it runs.
 
     The arithmetic is IEEE 754 in the order written: no operation is contracted, reassociated or
     taken from another library, so a result is the same on every call, whatever the batch.
     Divisions by zero give inf or nan, as in NumPy.
+
+    A kernel calls others by a global name of its module.
     """
-    made: Kernel = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return made
+    return cast(Function, Kernel(function))
+
+
+class Kernel:
+    """A kernel before its first call, which imports the compiler: that alone takes 0.4 s.
+
+    Attributes
+    ----------
+    py_func : callable
+        The pure form.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.py_func = function
+        self._run: Callable[..., Any] = self._first_run
+        functools.update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the machine code; the first call makes or loads it."""
+        return self._run(*arguments)
+
+    def _first_run(self, *arguments: Any) -> Any:
+        self._run = self.machine_code()
+        return self._run(*arguments)
+
+    def machine_code(self) -> Callable[..., Any]:
+        """The function of the compiler, also for the kernels that this one calls."""
+        if self._run != self._first_run:
+            return self._run
+        import numba
+
+        names = self.py_func.__globals__  # type: ignore[attr-defined]
+        for name, kernel in self._called():
+            names[name] = kernel.machine_code()
+        # The compiler's own cache does not see a change in a kernel that is called by this one.
+        of_user, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(self._folder())
+        try:
+            code = numba.njit(cache=True, nogil=True, error_model="numpy")(self.py_func)
+        finally:
+            numba.config.CACHE_DIR = of_user
+        self._run = code
+        return cast("Callable[..., Any]", code)
+
+    def _called(self) -> Iterator[tuple[str, Kernel]]:
+        """Kernels that this one calls, by their names in its module."""
+        code = self.py_func.__code__  # type: ignore[attr-defined]
+        names = self.py_func.__globals__  # type: ignore[attr-defined]
+        for name in code.co_names:
+            if isinstance(names.get(name), Kernel):
+                yield name, names[name]
+
+    @functools.cached_property
+    def files(self) -> frozenset[str]:
+        """Sources of this kernel and of those that it calls."""
+        own = self.py_func.__code__.co_filename  # type: ignore[attr-defined]
+        return frozenset({own}).union(*(kernel.files for _, kernel in self._called()))
+
+    def _folder(self) -> Path:
+        """Where the machine code is kept, another place for every state of the sources."""
+        digest = hashlib.sha256()
+        for path in sorted(self.files):
+            digest.update(Path(path).read_bytes())
+        beside = Path(self.py_func.__code__.co_filename).parent / "__pycache__"  # type: ignore[attr-defined]
+        return cache_folder(beside) / f"kernels-{digest.hexdigest()[:16]}"
+
+
+def cache_folder(beside: Path) -> Path:
+    """A folder for what can be made again: the one asked for, or the user's if that is read-only."""
+    try:
+        beside.mkdir(exist_ok=True)
+    except OSError:
+        pass
+    if os.access(beside, os.W_OK):
+        return beside
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "rail_corridor"

@@ -8,6 +8,7 @@ the first call, kept in ``__pycache__`` beside the source, and found there by ev
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -94,11 +95,9 @@ class Kernel:
 
 
 def cache_folder(beside: Path) -> Path:
-    """A folder for what can be made again: the one asked for, or the user's if that is read-only."""
-    try:
+    """A folder for what can be made again: the one asked for, the user's if that is read-only."""
+    with contextlib.suppress(OSError):
         beside.mkdir(exist_ok=True)
-    except OSError:
-        pass
     if os.access(beside, os.W_OK):
         return beside
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"

@@ -12,11 +12,11 @@ from scipy.special import j0
 from rail_signals.train_radio.burst import RadioBurstFormat
 from rail_signals.train_radio.pilot_estimation import (
     PilotLevel,
-    PilotPattern,
     WienerEstimator,
     _channels,
     _levels,
 )
+from rail_signals.train_radio.pilot_pattern import PilotPattern
 from rail_signals.train_radio.pulse import matched_filter, root_raised_cosine, shape_pulses
 from rail_signals.train_radio.space_time_block import Scheme, _combined, _encoded, scheme
 from rail_signals.train_radio.symbol_mapping import constellation

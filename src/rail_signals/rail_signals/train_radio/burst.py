@@ -24,7 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
 from rail_signals.compiled import compiled
 
-from .pilot_estimation import PilotPattern, wiener_estimator
+from .pilot_estimation import wiener_estimator
+from .pilot_pattern import PilotPattern
 from .pulse import matched_filter, root_raised_cosine, shape_pulses
 from .space_time_block import Scheme
 from .symbol_mapping import BitArray, Constellation

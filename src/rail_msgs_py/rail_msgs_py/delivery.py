@@ -81,6 +81,8 @@ class LocalReader:
     ----------
     node : node
         Whose it is.
+    fail : callable
+        Told of what a callback raises.
     take_raw : callable
         Takes serialised messages.
     take_view : callable, optional
@@ -88,6 +90,7 @@ class LocalReader:
     """
 
     node: Any
+    fail: Callable[[Exception], None]
     take_raw: Callable[[bytes], None]
     take_view: Callable[[Any], None] | None = None
 
@@ -105,7 +108,7 @@ class LocalDelivery:
 
     def __init__(self) -> None:
         self._lines: dict[str, Line] = {}
-        self._queue: deque[tuple[Callable[[Any], None], Any]] = deque()
+        self._queue: deque[tuple[Callable[[Any], None], Any, LocalReader]] = deque()
         self._under_way = False
         self._executor: Any = None
         self._unsettled: list[tuple[Line, Callable[[], None]]] = []
@@ -144,27 +147,25 @@ class LocalDelivery:
             Its serialised form, if there is one already.
         """
         put = self._queue.append
-        if isinstance(message, bytes):
+        if message is raw:
             for reader in line.readers:
-                put((reader.take_raw, message))
+                put((reader.take_raw, raw, reader))
             return
         for reader in line.readers:
             if reader.take_view is not None:
-                put((reader.take_view, message))
+                put((reader.take_view, message, reader))
                 continue
             if raw is None:
-                raw = message.to_cdr()
-            put((reader.take_raw, raw))
+                raw = serialised(message)
+            put((reader.take_raw, raw, reader))
 
     def remove(self, node: Any) -> None:
         """Hand nothing any longer to a node."""
-        gone: set[Any] = set()
         for line in self._lines.values():
-            for reader in line.readers:
-                if reader.node is node:
-                    gone.update((reader.take_raw, reader.take_view))
             line.readers = [reader for reader in line.readers if reader.node is not node]
-        self._queue = deque(entry for entry in self._queue if entry[0] not in gone)
+        waiting = [entry for entry in self._queue if entry[2].node is not node]
+        self._queue.clear()
+        self._queue.extend(waiting)
 
     def run(self) -> None:
         """Hand over what waits, and what comes of it; long work is done in turns."""
@@ -173,14 +174,18 @@ class LocalDelivery:
         self._under_way = True
         until_s = time.monotonic() + _TURN_S
         handed_over = 0
+        queue = self._queue
         try:
-            while self._queue:
-                take, message = self._queue.popleft()
-                take(message)
+            while queue:
+                take, message, reader = queue.popleft()
+                try:
+                    take(message)
+                except Exception as error:
+                    reader.fail(error)
                 handed_over += 1
                 if handed_over % _LOOK_EVERY == 0 and time.monotonic() > until_s:
                     break
         finally:
             self._under_way = False
-            if self._queue and self._executor is not None:
+            if queue and self._executor is not None:
                 self._executor.create_task(self.run)

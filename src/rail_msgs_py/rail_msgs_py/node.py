@@ -221,10 +221,7 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
             subscribe()
             self.await_connection(lambda: self.count_publishers(name) > 0, name, NO_SENDER)
             return
-        safely = self._safely
-        reader = LocalReader(
-            self, safely(take_raw), None if take_view is None else safely(take_view)
-        )
+        reader = LocalReader(self, self._failed_callback, take_raw, take_view)
         line = delivery.read(name, reader, subscribe)
         self.await_connection(
             lambda: line.writers > 0 or self.count_publishers(name) > 0, name, NO_SENDER
@@ -241,26 +238,21 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         Exceptions are told on ``/diagnostics`` instead of stopping the process. The tick's timeout
         then treats the node as silent, as it would a broken device.
         """
-        safe, delivery = self._safely(callback), self._delivery
-        if delivery is None:
-            return safe
-
-        def run(*arguments: Any) -> None:
-            safe(*arguments)
-            delivery.run()
-
-        return run
-
-    def _safely(self, callback: Callable[..., None]) -> Callable[..., None]:
+        delivery = self._delivery
 
         def run(*arguments: Any) -> None:
             try:
                 callback(*arguments)
             except Exception as error:
-                self.get_logger().error(traceback.format_exc())
-                self.report(DiagnosticStatus.ERROR, "software", f"{type(error).__name__}: {error}")
+                self._failed_callback(error)
+            if delivery is not None:
+                delivery.run()
 
         return run
+
+    def _failed_callback(self, error: Exception) -> None:
+        self.get_logger().error("".join(traceback.format_exception(error)))
+        self.report(DiagnosticStatus.ERROR, "software", f"{type(error).__name__}: {error}")
 
     def every(self, period_s: float, callback: Callable[[], None]) -> Any:
         """Timer on the steady wall clock."""

@@ -63,7 +63,7 @@ class CorridorPublisher:
         publish_raw, count, put = self._publisher.handle.publish_raw, self._count, delivery.put
 
         def send(message: Sendable) -> None:
-            raw = message if isinstance(message, bytes) else None
+            raw = message if type(message) is bytes else None
             if sink is not None:
                 raw = serialised(message) if raw is None else raw
                 sink(raw)

@@ -59,7 +59,7 @@ class Kernel:
             return self._run
         import numba
 
-        names = self.py_func.__globals__  # type: ignore[attr-defined]
+        names = self.py_func.__globals__
         for name, kernel in self._called():
             names[name] = kernel.machine_code()
         # The compiler's own cache does not see a change in a kernel that is called by this one.
@@ -73,8 +73,8 @@ class Kernel:
 
     def _called(self) -> Iterator[tuple[str, Kernel]]:
         """Kernels that this one calls, by their names in its module."""
-        code = self.py_func.__code__  # type: ignore[attr-defined]
-        names = self.py_func.__globals__  # type: ignore[attr-defined]
+        code = self.py_func.__code__
+        names = self.py_func.__globals__
         for name in code.co_names:
             if isinstance(names.get(name), Kernel):
                 yield name, names[name]
@@ -82,7 +82,7 @@ class Kernel:
     @functools.cached_property
     def files(self) -> frozenset[str]:
         """Sources of this kernel and of those that it calls."""
-        own = self.py_func.__code__.co_filename  # type: ignore[attr-defined]
+        own = self.py_func.__code__.co_filename
         return frozenset({own}).union(*(kernel.files for _, kernel in self._called()))
 
     def _folder(self) -> Path:
@@ -90,7 +90,7 @@ class Kernel:
         digest = hashlib.sha256()
         for path in sorted(self.files):
             digest.update(Path(path).read_bytes())
-        beside = Path(self.py_func.__code__.co_filename).parent / "__pycache__"  # type: ignore[attr-defined]
+        beside = Path(self.py_func.__code__.co_filename).parent / "__pycache__"
         return cache_folder(beside) / f"kernels-{digest.hexdigest()[:16]}"
 
 

@@ -12,9 +12,15 @@ import contextlib
 import functools
 import hashlib
 import os
+import pickle
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar, cast
+
+#: Beside the machine code: with which types the first call was.
+_CALLED_AS = "{}.called_as"
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -41,8 +47,10 @@ class Kernel:
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
+        assert isinstance(function, FunctionType)
         self.py_func = function
         self._run: Callable[..., Any] = self._first_run
+        self._name = function.__qualname__
         functools.update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -50,8 +58,35 @@ class Kernel:
         return self._run(*arguments)
 
     def _first_run(self, *arguments: Any) -> Any:
-        self._run = self.machine_code()
-        return self._run(*arguments)
+        code = self.machine_code()
+        answer = code(*arguments)
+        note = self._folder / _CALLED_AS.format(self._name)
+        if not note.is_file():
+            import numba
+
+            signature = tuple(numba.typeof(argument) for argument in arguments)
+            with contextlib.suppress(OSError):
+                note.write_bytes(pickle.dumps(signature))
+        return answer
+
+    def preload(self) -> bool:
+        """Load the machine code that an earlier process has made, ahead of the first call.
+
+        Returns
+        -------
+        bool
+            False if no process has yet called the kernel; then nothing is done.
+        """
+        note = self._folder / _CALLED_AS.format(self._name)
+        if not note.is_file():
+            return False
+        code: Any = self.machine_code()
+        try:
+            code.compile(pickle.loads(note.read_bytes()))
+        except (pickle.UnpicklingError, EOFError, AttributeError, ImportError):
+            note.unlink(missing_ok=True)
+            return False
+        return True
 
     def machine_code(self) -> Callable[..., Any]:
         """The function of the compiler, also for the kernels that this one calls."""
@@ -59,13 +94,18 @@ class Kernel:
             return self._run
         import numba
 
-        names = self.py_func.__globals__
-        for name, kernel in self._called():
-            names[name] = kernel.machine_code()
+        # The compiler wants to see its own functions behind the names of those that are called.
+        function = FunctionType(
+            self.py_func.__code__,
+            self.py_func.__globals__
+            | {name: kernel.machine_code() for name, kernel in self._called()},
+            self.py_func.__name__,
+        )
+        function.__qualname__ = self.py_func.__qualname__
         # The compiler's own cache does not see a change in a kernel that is called by this one.
-        of_user, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(self._folder())
+        of_user, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(self._folder)
         try:
-            code = numba.njit(cache=True, nogil=True, error_model="numpy")(self.py_func)
+            code = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
         finally:
             numba.config.CACHE_DIR = of_user
         self._run = code
@@ -85,6 +125,7 @@ class Kernel:
         own = self.py_func.__code__.co_filename
         return frozenset({own}).union(*(kernel.files for _, kernel in self._called()))
 
+    @functools.cached_property
     def _folder(self) -> Path:
         """Where the machine code is kept, another place for every state of the sources."""
         digest = hashlib.sha256()
@@ -92,6 +133,17 @@ class Kernel:
             digest.update(Path(path).read_bytes())
         beside = Path(self.py_func.__code__.co_filename).parent / "__pycache__"
         return cache_folder(beside) / f"kernels-{digest.hexdigest()[:16]}"
+
+
+def preload_kernels() -> int:
+    """Load the machine code of the kernels of all modules imported so far; how many there were.
+
+    What is loaded now need not be in the first tick.
+    """
+    modules = [module for module in list(sys.modules.values()) if module is not None]
+    values = (value for module in modules for value in list(vars(module).values()))
+    kernels = {id(value): value for value in values if type(value) is Kernel}
+    return sum(kernel.preload() for kernel in kernels.values())
 
 
 def cache_folder(beside: Path) -> Path:

@@ -39,6 +39,7 @@ from rail_corridor.scenario.model import Scenario
 from .external_traffic import FULL_NAME as EXTERNAL_TRAFFIC
 from .external_traffic import ExternalTrafficRecorder
 from .host import destroy_nodes, make_context, make_nodes, run_nodes
+from .kernels import compile_before_the_first_run
 from .kills import FaultInjector, Kill, check_kills
 from .parameter_services import ParameterServicesOnDemand
 from .processes import ProcessGroup, remove_orphaned_segments
@@ -95,6 +96,7 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
     """
     if options.record is not None:
         _check_recording(options.record, options.only)
+    compile_before_the_first_run(console)
     discover_on("all" if options.only else "this")
     directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
     try:

@@ -103,10 +103,34 @@ class Line:
     readers: list[LocalReader] = field(default_factory=list)
 
 
+@dataclass(eq=False)
+class Ear:
+    """One subscription for all nodes of a process that listen to a topic.
+
+    Many nodes publish on it: that each of them heard each of the others by itself would take the
+    square of their number in memory and in time.
+
+    Parameters
+    ----------
+    owner : node
+        Node whose subscription it is.
+    listeners : list of (node, subscribe, callback)
+    """
+
+    owner: Any
+    listeners: list[tuple[Any, Callable[[Callable[[Any], None]], None], Callable[[Any], None]]]
+
+    def hear(self, message: Any) -> None:
+        """Tell all listeners."""
+        for _, _, callback in tuple(self.listeners):
+            callback(message)
+
+
 class LocalDelivery:
     """Hands the messages of one process from node to node."""
 
     def __init__(self) -> None:
+        self._ears: dict[str, Ear] = {}
         self._lines: dict[str, Line] = {}
         self._queue: deque[tuple[Callable[[Any], None], Any, LocalReader]] = deque()
         self._under_way = False
@@ -123,6 +147,26 @@ class LocalDelivery:
         line.readers.append(reader)
         self._unsettled.append((line, subscribe))
         return line
+
+    def listen(
+        self,
+        name: str,
+        node: Any,
+        subscribe: Callable[[Callable[[Any], None]], None],
+        callback: Callable[[Any], None],
+    ) -> None:
+        """Listen to a topic of many publishers, by the one subscription of the process to it.
+
+        Parameters
+        ----------
+        subscribe : callable of a callback
+            Makes the subscription, should the node have to be the one that has it.
+        """
+        ear = self._ears.get(name)
+        if ear is None:
+            ear = self._ears[name] = Ear(node, [])
+            subscribe(ear.hear)
+        ear.listeners.append((node, subscribe, callback))
 
     def settle(self, executor: Any) -> None:
         """All nodes are made: subscribe outside to what nobody here sends.
@@ -161,6 +205,15 @@ class LocalDelivery:
 
     def remove(self, node: Any) -> None:
         """Hand nothing any longer to a node."""
+        for name, ear in list(self._ears.items()):
+            ear.listeners = [each for each in ear.listeners if each[0] is not node]
+            if ear.owner is not node:
+                continue
+            if not ear.listeners:
+                del self._ears[name]
+                continue
+            ear.owner, subscribe, _ = ear.listeners[0]
+            subscribe(ear.hear)
         for line in self._lines.values():
             line.readers = [reader for reader in line.readers if reader.node is not node]
         waiting = [entry for entry in self._queue if entry[2].node is not node]

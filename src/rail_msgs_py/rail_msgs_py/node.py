@@ -229,8 +229,16 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         """Subscribe to messages of a topic that nothing waits for."""
-        name = self.name_of(topic, **parts)
-        self.create_subscription(topic.type, name, self.guarded(callback), topic.qos)
+        name, delivery = self.name_of(topic, **parts), self._delivery
+
+        def subscribe(receive: Callable[[Any], None]) -> None:
+            self.create_subscription(topic.type, name, self.guarded(receive), topic.qos)
+
+        if delivery is None:
+            subscribe(callback)
+        else:
+            safely = self._safely(callback)
+            delivery.listen(self.resolve_topic_name(name), self, subscribe, safely)
 
     def guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
         """Callback for the executor; what it sends within the process is handed over after it.
@@ -247,6 +255,17 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
                 self._failed_callback(error)
             if delivery is not None:
                 delivery.run()
+
+        return run
+
+    def _safely(self, callback: Callable[..., None]) -> Callable[..., None]:
+        """Callback whose exceptions are this node's."""
+
+        def run(*arguments: Any) -> None:
+            try:
+                callback(*arguments)
+            except Exception as error:
+                self._failed_callback(error)
 
         return run
 

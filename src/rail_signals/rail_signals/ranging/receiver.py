@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.arrays import BoolArray, FloatArray
 
+from .burst_kernel import estimate_bursts
 from .detector import detection_threshold
 from .fm_spectrum import fm_spectrum
 from .offset_search import OffsetSearch, RealArray
@@ -121,13 +122,28 @@ class FmToneReceiver:
         components = fm_spectrum(signal)
         strong = components.strongest(_STRONG_FRACTION)
         self._search = OffsetSearch(signal, strong, max_offset_hz) if max_offset_hz > 0 else None
-        self._weights = self._search.tapers if self._search else np.ones((1, self._periods))
+        weights = self._search.tapers if self._search else np.ones((1, self._periods))
+        self._weights = {
+            kind: None if weights is None else weights.astype(kind) for kind in _CEILINGS
+        }
         search_hz = self._search.width_hz if self._search else 0.0
         samples = signal.samples
         fraction = detection_threshold(
             false_alarm, len(strong.bins), samples, search_hz, signal.duration_s
         )
-        self._fit = TonePhaseFit(signal, components, strong, fraction)
+        fit = TonePhaseFit(signal, components, strong, fraction)
+        self._levels = {kind: fit.levels(ceiling) for kind, ceiling in _CEILINGS.items()}
+        search = self._search
+        self._tables = (
+            search.grid if search else np.zeros((2, 1, 1)),
+            search.halves if search else np.zeros((2, 0, 0)),
+            search.numbers if search else np.zeros(6),
+            fit.basis,
+            fit.orders,
+            fit.weights,
+            fit.pairs,
+            fit.pair_weights,
+        )
 
     def estimate(self, bursts: ArrayLike) -> ToneEstimate:
         """Estimate tone phases, offset, amplitude and noise of each burst.
@@ -152,20 +168,17 @@ class FmToneReceiver:
         if x.ndim == 0 or x.shape[-1] != samples:
             raise ValueError(f"bursts must have {samples} samples, got shape {x.shape}")
         lead = x.shape[:-1]
-        real, max_snr = _SINGLE if x.dtype == np.complex64 else _DOUBLE
+        real = np.float32 if x.dtype == np.complex64 else np.float64
         parts = np.ascontiguousarray(x).reshape(-1, samples).view(real)
+        tones = len(self.signal.tones_hz)
+        table = np.empty((len(parts), 2 * tones + 4))
+        detected = np.empty(len(parts), dtype=np.bool_)
         with np.errstate(all="ignore"):
             # In pieces that stay in the processor's cache.
             step = max(1, _CHUNK_BYTES // (samples * x.itemsize))
-            if len(parts) <= step or self._weights is not None:
-                energy, offset_hz, folded = self._fold_bursts(parts, step)
-            else:
-                pieces = [
-                    self._fold_bursts(parts[i : i + step], step) for i in range(0, len(parts), step)
-                ]
-                energy, offset_hz, folded = map(np.concatenate, zip(*pieces, strict=True))
-            table, detected = self._fit.evaluate(energy, offset_hz, folded, max_snr)
-        tones = len(self.signal.tones_hz)
+            for i in range(0, len(parts), step):
+                piece = slice(i, i + step)
+                self._estimate_piece(parts[piece], table[piece], detected[piece])
         table = table.reshape(*lead, 2 * tones + 4)
         return ToneEstimate(
             table[..., :tones],
@@ -177,34 +190,17 @@ class FmToneReceiver:
             detected.reshape(lead),
         )
 
-    def _fold_bursts(
-        self, parts: RealArray, step: int
-    ) -> tuple[RealArray, FloatArray, ComplexArray]:
-        """Energy, offset [batch] and folded period [batch, 1, period] of bursts."""
-        energy, rows = self._sum_bursts(parts, step)
-        if self._search:
-            offset_hz = self._search.offset_hz(rows)
-            return energy, offset_hz, self._search.fold(rows, offset_hz)
-        return energy, np.zeros(len(parts)), rows.astype(np.float64).view(np.complex128)
-
-    def _sum_bursts(self, parts: RealArray, step: int) -> tuple[RealArray, RealArray]:
-        """Energy [batch] and the rows of `OffsetSearch.fold` of bursts [batch, 2 samples].
-
-        Weighted sums are made of `step` bursts at a time.
-        """
-        batch = len(parts)
-        rows = parts.reshape(batch, self._periods, 2 * self._period)
-        if self._weights is None:
-            return np.vecdot(parts, parts), rows
-        weights = self._weights.astype(parts.dtype)
-        energy = np.empty(batch, dtype=parts.dtype)
-        sums = np.empty((batch, len(weights), rows.shape[2]), dtype=parts.dtype)
-        for i in range(0, batch, step):
-            piece = slice(i, i + step)
-            np.vecdot(parts[piece], parts[piece], out=energy[piece])
-            np.matmul(weights, rows[piece], out=sums[piece])
-        return energy, sums
+    def _estimate_piece(self, parts: RealArray, table: FloatArray, detected: BoolArray) -> None:
+        """Fill the fields of some bursts [batch, 2 samples] (`estimate_bursts`)."""
+        energy = np.vecdot(parts, parts)
+        rows = parts.reshape(len(parts), self._periods, 2 * self._period)
+        weights = self._weights[parts.dtype]
+        if weights is not None:
+            rows = np.matmul(weights, rows)
+        components = self._search.components(rows) if self._search else rows
+        estimate_bursts(
+            energy, rows, components, *self._tables, self._levels[parts.dtype], table, detected
+        )
 
 
-_SINGLE = (np.dtype(np.float32), MAX_SNR_SINGLE)
-_DOUBLE = (np.dtype(np.float64), MAX_SNR)
+_CEILINGS = {np.dtype(np.float32): MAX_SNR_SINGLE, np.dtype(np.float64): MAX_SNR}

@@ -23,6 +23,7 @@ def estimate_bursts(
     energy: NDArray[np.floating],
     rows: NDArray[np.floating],
     components: NDArray[np.floating],
+    strong: FloatArray,
     grid: FloatArray,
     tapers: FloatArray,
     search: FloatArray,
@@ -40,18 +41,21 @@ def estimate_bursts(
     Parameters
     ----------
     energy : float [batch]
-        Energy of each burst.
+        Energy of each burst; empty if it is to be computed here, from rows that are the periods.
     rows : float [batch, rows, 2 period]
         Its periods, or sums of them weighted by `tapers`, real and imaginary parts in turn.
     components : float [batch, segments, 2 components]
-        Strong components of its segments: real parts, then imaginary parts.
+        Strong components of its segments, real parts, then imaginary parts; empty if they are to
+        be computed here.
+    strong : float [2 components, 2 period]
+        From a period to these.
     grid : float [2, frequencies, segments]
         Cosine and sine of the turns of the segments at the offsets of the grid from zero up.
-    tapers : float [2, half, rows]
-        Sums and differences of the weights of late and early periods, from the middle of the
-        burst; empty if the rows are the periods.
+    tapers : float [rows, half]
+        Weights of the periods from the middle of the burst up, twice, but for that in the
+        middle; empty if the rows are the periods.
     search : float [6]
-        Numbers of `OffsetSearch`; the first, the step of the grid, is zero without a search.
+        `OffsetSearch.numbers`; all zero if there is no search.
     basis : float [2 period, columns]
         From a folded period to its components, real and imaginary parts in turn.
     orders : int [components, tones]
@@ -68,25 +72,38 @@ def estimate_bursts(
     """
     width = rows.shape[2]
     folded = np.empty(width)
-    work = np.empty((2, width))
-    turn = np.empty((2, max(rows.shape[1], 2 * tapers.shape[1], width // 2) + 1))
+    in_phase, quadrature = np.empty(width), np.empty(width)
+    turn = np.empty((2, max(rows.shape[1], tapers.shape[1], width // 2)))
+    lanes, own_lanes = np.empty(width), np.empty(width, rows.dtype)
+    own = np.empty((grid.shape[2], len(strong)))
     found = np.empty(basis.shape[1])
-    responses = np.empty((2 * grid.shape[1], components.shape[2]))
+    responses = np.empty((2 * grid.shape[1], len(strong)))
     power = np.empty(2 * grid.shape[1])
     phasors = np.empty((orders.shape[1], 2 * int(levels[6]) + 1), dtype=np.complex128)
-    for burst in range(len(energy)):
+    for burst in range(len(rows)):
         offset_hz = 0.0
         if search[0] == 0.0:
             for j in range(width):
                 folded[j] = rows[burst, 0, j]
         else:
-            offset_hz = _offset_hz(components[burst], grid, search, responses, power)
-            _fold(rows[burst], tapers, search, offset_hz, turn, work, folded)
+            if len(components):
+                for segment in range(len(own)):
+                    for c in range(len(strong)):
+                        own[segment, c] = components[burst, segment, c]
+            else:
+                _segment_components(rows[burst], strong, folded, own)
+            offset_hz = _offset_hz(own, grid, search, responses, power)
+            _fold(rows[burst], tapers, search, offset_hz, turn, in_phase, quadrature, folded)
+        total = 0.0
+        if len(energy):
+            total = float(energy[burst])
+        else:
+            total = float(_sum_of_squares(rows[burst].ravel(), own_lanes))
         _project(folded, basis, found)
         detected[burst] = _fit_tones(
-            float(energy[burst]),
+            total,
             offset_hz,
-            _energy(folded),
+            _sum_of_squares(folded, lanes),
             found,
             orders,
             fit,
@@ -99,8 +116,22 @@ def estimate_bursts(
 
 
 @compiled
+def _segment_components(
+    rows: NDArray[np.floating], strong: FloatArray, period: FloatArray, own: FloatArray
+) -> None:
+    """Strong components of segments [segments, components] of so many rows each."""
+    repeats = len(rows) // len(own)
+    for segment in range(len(own)):
+        period[:] = 0.0
+        for n in range(segment * repeats, (segment + 1) * repeats):
+            _add(period, 1.0, rows[n])
+        for c in range(len(strong)):
+            own[segment, c] = _dot(period, strong[c], len(period))
+
+
+@compiled
 def _offset_hz(
-    components: NDArray[np.floating],
+    components: FloatArray,
     grid: FloatArray,
     search: FloatArray,
     responses: FloatArray,
@@ -116,7 +147,7 @@ def _offset_hz(
             # The turns below zero are the conjugates of those above.
             rr, ri, ir, ii = 0.0, 0.0, 0.0, 0.0
             for segment in range(components.shape[0]):
-                re, im = float(components[segment, c]), float(components[segment, count + c])
+                re, im = components[segment, c], components[segment, count + c]
                 cosine, sine = grid[0, g, segment], grid[1, g, segment]
                 rr += cosine * re
                 ii += sine * im
@@ -137,8 +168,7 @@ def _offset_hz(
         both = responses[peak - 1, c] + responses[peak + 1, c]
         total += both * both
     quotient = (power[peak + 1] - power[peak - 1]) / total
-    offset_hz: float = math.atan(quotient * search[1]) * search[2] + search[0] * (peak - zero)
-    return offset_hz
+    return math.atan(quotient * search[1]) * search[2] + search[0] * (peak - zero)
 
 
 @compiled
@@ -161,44 +191,69 @@ def _turns(count: int, half_step: float, turn: FloatArray) -> int:
 
 
 @compiled
+def _dot(one: FloatArray, other: FloatArray, count: int) -> float:
+    """Sum of products, in four partial sums that do not wait for each other."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    whole = count - count % _LANES
+    for n in range(0, whole, _LANES):
+        a += one[n] * other[n]
+        b += one[n + 1] * other[n + 1]
+        c += one[n + 2] * other[n + 2]
+        d += one[n + 3] * other[n + 3]
+    for n in range(whole, count):
+        a += one[n] * other[n]
+    return (a + b) + (c + d)
+
+
+@compiled
+def _add(total: FloatArray, factor: float, row: NDArray[np.floating]) -> None:
+    for j in range(len(total)):
+        total[j] += factor * row[j]
+
+
+@compiled
+def _add_pair(
+    in_phase: FloatArray,
+    quadrature: FloatArray,
+    cosine: float,
+    sine: float,
+    late: NDArray[np.floating],
+    early: NDArray[np.floating],
+) -> None:
+    for j in range(len(in_phase)):
+        in_phase[j] += cosine * (late[j] + early[j])
+        quadrature[j] += sine * (late[j] - early[j])
+
+
+@compiled
 def _fold(
     rows: NDArray[np.floating],
     tapers: FloatArray,
     search: FloatArray,
     offset_hz: float,
     turn: FloatArray,
-    work: FloatArray,
+    in_phase: FloatArray,
+    quadrature: FloatArray,
     folded: FloatArray,
 ) -> None:
     """Sum of the periods after turning back by an offset about the middle of the burst."""
     width, count = len(folded), rows.shape[0]
-    in_phase, quadrature = work[0], work[1]
     in_phase[:] = 0.0
     quadrature[:] = 0.0
     if tapers.shape[1]:
         half = _turns(int(search[5]), search[4] * offset_hz, turn)
+        # Even sequences have cosines only, odd ones sines.
         for k in range(count):
-            cosine, sine = 0.0, 0.0
-            for n in range(half):
-                cosine += turn[0, n] * tapers[0, n, k]
-                sine += turn[1, n] * tapers[1, n, k]
-            row = rows[k]
-            for j in range(width):
-                in_phase[j] += cosine * row[j]
-                quadrature[j] += sine * row[j]
+            factor = _dot(turn[k % 2], tapers[k], half)
+            _add(in_phase if k % 2 == 0 else quadrature, factor, rows[k])
     else:
         half = _turns(count, search[4] * offset_hz, turn)
         for n in range(half):
-            cosine, sine = turn[0, n], turn[1, n]
-            late, early = rows[count - half + n], rows[half - 1 - n]
-            if count % 2 and n == 0:
-                for j in range(width):
-                    in_phase[j] += late[j]
+            late, early = count - half + n, half - 1 - n
+            if late == early:
+                _add(in_phase, 1.0, rows[late])
             else:
-                for j in range(width):
-                    u, v = float(late[j]), float(early[j])
-                    in_phase[j] += cosine * (u + v)
-                    quadrature[j] += sine * (u - v)
+                _add_pair(in_phase, quadrature, turn[0, n], turn[1, n], rows[late], rows[early])
     period = width // 2
     half = _turns(period, search[3] * offset_hz, turn)
     for n in range(half):
@@ -223,13 +278,34 @@ def _project(vector: FloatArray, matrix: FloatArray, out: FloatArray) -> None:
 
 
 @compiled
-def _energy(vector: FloatArray) -> float:
-    """Sum of squares of real and imaginary parts in turn."""
-    re, im = 0.0, 0.0
-    for n in range(0, len(vector), 2):
-        re += vector[n] * vector[n]
-        im += vector[n + 1] * vector[n + 1]
-    return re + im
+def _sum_of_squares(parts: NDArray[np.floating], lanes: NDArray[np.floating]) -> float:
+    """Energy of a row that is a multiple of the lanes long, in as many partial sums."""
+    lanes[:] = 0.0
+    width = len(lanes)
+    rows = len(parts) // width
+    whole = rows - rows % 4
+    for first in range(0, whole * width, 4 * width):
+        a = parts[first : first + width]
+        b = parts[first + width : first + 2 * width]
+        c = parts[first + 2 * width : first + 3 * width]
+        d = parts[first + 3 * width : first + 4 * width]
+        for j in range(width):
+            lanes[j] += (a[j] * a[j] + b[j] * b[j]) + (c[j] * c[j] + d[j] * d[j])
+    for first in range(whole * width, rows * width, width):
+        a = parts[first : first + width]
+        for j in range(width):
+            lanes[j] += a[j] * a[j]
+    total = 0.0
+    for j in range(0, len(lanes), 2):
+        total += lanes[j] + lanes[j + 1]
+    return total
+
+
+@compiled
+def _wrapped(phase_rad: float) -> float:
+    """Phase [rad] in [0, 2 pi): that of a tiny negative one would round to a full turn."""
+    wrapped = phase_rad - _TURN * math.floor(phase_rad / _TURN)
+    return 0.0 if wrapped >= _TURN else max(wrapped, 0.0)
 
 
 @compiled
@@ -291,8 +367,7 @@ def _fit_tones(
             im += found[2 * c + 1] * fit[c, 1 + tone]
         slope = im * amplitude.real - re * amplitude.imag
         step_rad = slope / square
-        # Twice: the remainder of a tiny negative phase rounds to a full turn.
-        row[tone] = (row[tone] - step_rad) % _TURN % _TURN
+        row[tone] = _wrapped(row[tone] - step_rad)
         # The step adds to what the fit explains, to second order.
         power_found += slope * step_rad * levels[7 + tones + tone]
     # Every component is in the folded period, so the energy outside it is noise.

@@ -8,7 +8,7 @@ over the components, peak.
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +35,9 @@ class OffsetSearch:
     """Tables of the search for the offset on a grid of half a cycle per burst, and its removal.
 
     Both (`burst_kernel`) work on rows of one period each: those of the burst, or weighted sums
-    of them if fewer than `MAX_TAPERS` do. The weights, `tapers`, are Slepian sequences
-    (Slepian, Bell System Technical Journal 57(5), 1978): the first of them hold every offset in
-    the interval but for `TAPER_LOSS`, so that nothing more is needed of the burst.
+    of them if fewer than `MAX_TAPERS` do. The weights, `tapers`, are Slepian sequences (Slepian,
+    Bell System Technical Journal 57(5), 1978): the first of them hold every offset in the
+    interval but for `TAPER_LOSS`, so that nothing more is needed of the burst.
 
     Interpolation follows Aboutanios and Mulgrew (IEEE Trans. Signal Processing 53(4),
     2005), with all components in one quotient: with ``R(+)``, ``R(-)`` the responses half a
@@ -89,7 +89,7 @@ class OffsetSearch:
         self.grid = np.stack([turn.real, turn.imag])
         """Turns of segments, or of weighted sums, at the offsets from zero up: [2, grid, rows]."""
         self.halves = _halves(self.tapers, periods)
-        """Sums and differences of weights from the middle of the burst up: [2, half, tapers]."""
+        """Twice the weights from the middle of the burst up [tapers, half]; [0, 0] if none."""
         self.numbers = np.array(
             [
                 step_hz,
@@ -104,35 +104,18 @@ class OffsetSearch:
         sample and of half a period [rad/Hz], periods."""
         # Real before imaginary parts, so that products with the grid stay real.
         basis = components.real_basis(period).reshape(2 * period, -1, 2).swapaxes(1, 2)
-        rows = np.tile(basis.reshape(2 * period, -1), (repeats, 1))
-        self._bases: dict[Any, NDArray[Any]] = {
-            np.dtype(kind): np.ascontiguousarray(rows, dtype=kind)
-            for kind in (np.float32, np.float64)
-        }
-
-    def components(self, rows: RealArray) -> RealArray:
-        """Strong components of segments of each of `rows` [batch, rows, 2 period].
-
-        Returns
-        -------
-        float [batch, segments, 2 components]
-            Real parts, then imaginary parts, in the precision of the rows.
-        """
-        # Matrix products are stacked, one of fixed shape for each burst, so that their
-        # rounding does not depend on the batch.
-        basis = self._bases[rows.dtype]
-        if rows.shape[2] != len(basis):
-            rows = rows.reshape(len(rows), self.grid.shape[2], len(basis))
-        found: RealArray = np.matmul(rows, basis)
-        return found
+        one = basis.reshape(2 * period, -1)
+        self.strong = np.ascontiguousarray(one.T)
+        """From a period to the components, real and then imaginary parts: [2 L, 2 period]."""
+        self.segment_basis = np.tile(one, (repeats, 1))
+        """From the periods of a segment to its components: [2 period repeats, 2 L]."""
 
 
 def _halves(tapers: FloatArray | None, periods: int) -> FloatArray:
-    """Weights of late and early periods, added and subtracted: [2, half, tapers]."""
+    """Weights [tapers, half] from the middle up, twice, but for that of a period in it."""
     if tapers is None:
-        return np.zeros((2, 0, 0))
-    late, early = tapers[:, periods // 2 :].T, tapers[:, ::-1][:, periods // 2 :].T
-    halves = np.stack([late + early, late - early])
+        return np.zeros((0, 0))
+    halves = 2.0 * tapers[:, periods // 2 :]
     if periods % 2:
         halves[:, 0] /= 2
     return halves
@@ -168,7 +151,12 @@ def slepian_sequences(count: int, cycles: float, loss: float) -> FloatArray:
     (8, 124)
     """
     index = np.arange(count)
-    _, vectors = np.linalg.eigh(np.sinc(2 * cycles * (index[:, None] - index)))
+    # Of a matrix with their eigenvectors whose eigenvalues lie apart (Slepian, equation 14), so
+    # that sequences are even or odd to the last digits.
+    matrix = np.diag((index - (count - 1) / 2) ** 2 * math.cos(2 * math.pi * cycles))
+    beside = index[1:] * (count - index[1:]) / 2
+    matrix += np.diag(beside, 1) + np.diag(beside, -1)
+    _, vectors = np.linalg.eigh(matrix)
     sequences = vectors.T[::-1]
     tones = cis(2 * math.pi * np.outer(np.linspace(0, cycles, 2 * count), index))
     held = np.cumsum(np.abs(tones @ sequences.T) ** 2, axis=1).min(axis=0) / count

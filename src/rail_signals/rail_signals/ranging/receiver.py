@@ -33,6 +33,7 @@ MAX_SNR_SINGLE = 1e6
 
 _STRONG_FRACTION = 0.92
 _CHUNK_BYTES = 3 << 18
+_FEW_SEGMENTS = 8
 
 
 @dataclass(frozen=True)
@@ -122,22 +123,17 @@ class FmToneReceiver:
             )
         components = fm_spectrum(signal)
         strong = components.strongest(_STRONG_FRACTION)
-        self._search = OffsetSearch(signal, strong, max_offset_hz) if max_offset_hz > 0 else None
-        weights = self._search.tapers if self._search else np.ones((1, self._periods))
-        self._weights = {
-            kind: None if weights is None else weights.astype(kind) for kind in _CEILINGS
-        }
-        search_hz = self._search.width_hz if self._search else 0.0
+        search = OffsetSearch(signal, strong, max_offset_hz) if max_offset_hz > 0 else None
+        search_hz = search.width_hz if search else 0.0
         samples = signal.samples
         fraction = detection_threshold(
             false_alarm, len(strong.bins), samples, search_hz, signal.duration_s
         )
         fit = TonePhaseFit(signal, components, strong, fraction)
-        self._levels = {kind: fit.levels(ceiling) for kind, ceiling in _CEILINGS.items()}
-        search = self._search
         self._tables = (
+            search.strong if search else np.zeros((1, 1)),
             search.grid if search else np.zeros((2, 1, 1)),
-            search.halves if search else np.zeros((2, 0, 0)),
+            search.halves if search else np.zeros((0, 0)),
             search.numbers if search else np.zeros(6),
             fit.basis,
             fit.orders,
@@ -145,6 +141,18 @@ class FmToneReceiver:
             fit.pairs,
             fit.pair_weights,
         )
+        weights = search.tapers if search else np.ones((1, self._periods))
+        has_products = weights is not None or search.grid.shape[2] > _FEW_SEGMENTS
+        self._plans = {
+            np.dtype(kind): _Plan(
+                has_products,
+                None if weights is None else weights.astype(kind),
+                np.ascontiguousarray(search.segment_basis, dtype=kind) if search else None,
+                fit.levels(ceiling),
+                (np.zeros(0, dtype=kind), np.zeros((0, 0, 0), dtype=kind)),
+            )
+            for kind, ceiling in _CEILINGS.items()
+        }
 
     def estimate(self, bursts: ArrayLike) -> ToneEstimate:
         """Estimate tone phases, offset, amplitude and noise of each burst.
@@ -174,9 +182,11 @@ class FmToneReceiver:
         tones = len(self.signal.tones_hz)
         table = np.empty((len(parts), 2 * tones + 4))
         detected = np.empty(len(parts), dtype=np.bool_)
-        with np.errstate(all="ignore"):
-            # In pieces that stay in the processor's cache.
-            step = max(1, _CHUNK_BYTES // (samples * x.itemsize))
+        # In pieces that stay in the processor's cache.
+        step = max(1, _CHUNK_BYTES // (samples * x.itemsize))
+        if len(parts) <= step:
+            self._estimate_piece(parts, table, detected)
+        else:
             for i in range(0, len(parts), step):
                 piece = slice(i, i + step)
                 self._estimate_piece(parts[piece], table[piece], detected[piece])
@@ -193,18 +203,35 @@ class FmToneReceiver:
 
     def _estimate_piece(self, parts: RealArray, table: FloatArray, detected: BoolArray) -> None:
         """Fill the fields of some bursts [batch, 2 samples] (`estimate_bursts`)."""
-        energy = np.vecdot(parts, parts)
+        plan = self._plans[parts.dtype]
         rows = parts.reshape(len(parts), self._periods, 2 * self._period)
-        weights = self._weights[parts.dtype]
-        if weights is not None:
-            rows = np.matmul(weights, rows)
-        components = self._search.components(rows) if self._search else rows
-        estimate_bursts(
-            energy, rows, components, *self._tables, self._levels[parts.dtype], table, detected
-        )
+        energy, components = plan.nothing
+        if plan.has_products:
+            # Stacked, one of fixed shape for each burst, so that rounding does not depend on
+            # the batch. Too large or not finite is not detected.
+            with np.errstate(all="ignore"):
+                energy = np.vecdot(parts, parts)
+                if plan.weights is not None:
+                    rows = np.matmul(plan.weights, rows)
+                if plan.basis is not None:
+                    segments = rows.reshape(len(parts), -1, len(plan.basis))
+                    components = np.matmul(segments, plan.basis)
+        estimate_bursts(energy, rows, components, *self._tables, plan.levels, table, detected)
 
 
-_CEILINGS: dict[np.dtype[Any], float] = {
-    np.dtype(np.float32): MAX_SNR_SINGLE,
-    np.dtype(np.float64): MAX_SNR,
-}
+@dataclass(frozen=True)
+class _Plan:
+    """What is done in the precision of the bursts before the compiled part.
+
+    With `has_products` energy, sums by `weights` and components by `basis` are matrix products;
+    without, the compiled part forms them: for few segments that takes less than the calls.
+    """
+
+    has_products: bool
+    weights: RealArray | None
+    basis: RealArray | None
+    levels: FloatArray
+    nothing: tuple[RealArray, RealArray]
+
+
+_CEILINGS = {np.float32: MAX_SNR_SINGLE, np.float64: MAX_SNR}

@@ -182,8 +182,8 @@ def run(
 
     from rich.console import Console
 
-    from rail_corridor.run.launcher import RunOptions
     from rail_corridor.run.launcher import run as run_corridor
+    from rail_corridor.run.options import RunOptions
 
     options = RunOptions(
         rate,

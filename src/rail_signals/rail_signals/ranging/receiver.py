@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -142,7 +141,8 @@ class FmToneReceiver:
             fit.pair_weights,
         )
         weights = search.tapers if search else np.ones((1, self._periods))
-        has_products = weights is not None or search.grid.shape[2] > _FEW_SEGMENTS
+        few = search is not None and search.grid.shape[2] <= _FEW_SEGMENTS
+        has_products = weights is not None or not few
         self._plans = {
             np.dtype(kind): _Plan(
                 has_products,

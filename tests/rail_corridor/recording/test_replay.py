@@ -94,7 +94,7 @@ def test_profiles_are_those_of_the_run(run: Any) -> None:
         assert offer.profile.depth == kind.qos.depth
         assert offer.profile.durability == kind.qos.durability
     assert {name for name, offer in offers.items() if offer.latched} == {
-        *("/diagnostics", "/failed", "/world/finished")
+        *("/failed", "/world/finished")
     }
 
 

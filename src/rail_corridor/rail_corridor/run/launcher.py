@@ -380,12 +380,10 @@ class _LaunchedRun:
                 self._console.print(f"report written to {self._options.report}")
         if self._recording is not None and not self._recording_failed:
             self._console.print(f"recorded to {self._options.record}")
-        if self._world_failed:
+        if self._world_failed or (self._recording_failed and not self._signal):
             return 1
         if self._signal:
             return 128 + self._signal
-        if self._recording_failed:
-            return 1
         if self._half_gone:
             return HALF_GONE
         return NODES_FAILED if self._unplanned_failures() else 0
@@ -394,8 +392,7 @@ class _LaunchedRun:
         """Whether nodes failed that were not meant to; says so, unless that is allowed."""
         if self._observer is None or self._options.allow_failures:
             return False
-        groups = () if self._here else self._groups.values()  # with a process all of its nodes are
-        killed = killed_nodes(self._options.kills, groups)
+        killed = killed_nodes(self._options.kills, () if self._here else self._groups.values())
         failed = [one["node"] for one in self._observer.failures if one["node"] not in killed]
         if failed:
             line = f"not meant to fail: {', '.join(failed)} (--allow-failures for exit code 0)"

@@ -141,7 +141,8 @@ class FmToneReceiver:
             fit.pair_weights,
         )
         weights = search.tapers if search else np.ones((1, self._periods))
-        has_products = weights is not None or search.grid.shape[2] > _FEW_SEGMENTS
+        segments = search.grid.shape[2] if search else 1
+        has_products = weights is not None or segments > _FEW_SEGMENTS
         self._plans = {
             np.dtype(kind): _Plan(
                 has_products,

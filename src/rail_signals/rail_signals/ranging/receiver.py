@@ -210,9 +210,10 @@ class FmToneReceiver:
             # Stacked, one of fixed shape for each burst, so that rounding does not depend on
             # the batch. Too large or not finite is not detected.
             with np.errstate(all="ignore"):
-                energy = np.vecdot(parts, parts)
+                # The sums come first: what reads the bursts from far away hides it best.
                 if plan.weights is not None:
                     rows = np.matmul(plan.weights, rows)
+                energy = np.vecdot(parts, parts)
                 if plan.basis is not None:
                     segments = rows.reshape(len(parts), -1, len(plan.basis))
                     components = np.matmul(segments, plan.basis)

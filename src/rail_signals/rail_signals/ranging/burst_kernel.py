@@ -168,8 +168,7 @@ def _offset_hz(
         both = responses[peak - 1, c] + responses[peak + 1, c]
         total += both * both
     quotient = (power[peak + 1] - power[peak - 1]) / total
-    offset_hz: float = math.atan(quotient * search[1]) * search[2] + search[0] * (peak - zero)
-    return offset_hz
+    return float(math.atan(quotient * search[1]) * search[2] + search[0] * (peak - zero))
 
 
 @compiled

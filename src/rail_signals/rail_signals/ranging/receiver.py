@@ -141,8 +141,8 @@ class FmToneReceiver:
             fit.pair_weights,
         )
         weights = search.tapers if search else np.ones((1, self._periods))
-        few = search is not None and search.grid.shape[2] <= _FEW_SEGMENTS
-        has_products = weights is not None or not few
+        segments = search.grid.shape[2] if search else 1
+        has_products = weights is not None or segments > _FEW_SEGMENTS
         self._plans = {
             np.dtype(kind): _Plan(
                 has_products,
@@ -210,9 +210,10 @@ class FmToneReceiver:
             # Stacked, one of fixed shape for each burst, so that rounding does not depend on
             # the batch. Too large or not finite is not detected.
             with np.errstate(all="ignore"):
-                energy = np.vecdot(parts, parts)
+                # The sums come first: what reads the bursts from far away hides it best.
                 if plan.weights is not None:
                     rows = np.matmul(plan.weights, rows)
+                energy = np.vecdot(parts, parts)
                 if plan.basis is not None:
                     segments = rows.reshape(len(parts), -1, len(plan.basis))
                     components = np.matmul(segments, plan.basis)

@@ -10,7 +10,7 @@ setup(
     maintainer="Rail Corridor maintainers",
     maintainer_email="maintainers@rail-corridor.example",
     packages=find_packages(include=[package_name, f"{package_name}.*"]),
-    package_data={"": ["py.typed", "builtin/*.yaml", "fastdds.xml", "static/*"]},
+    package_data={"": ["py.typed", "builtin/*.yaml", "fastdds*.xml", "static/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
         (f"share/{package_name}", ["package.xml"]),

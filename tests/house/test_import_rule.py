@@ -18,7 +18,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "rail_onboard": {"rail_signals", "rail_msgs_py"},
     "rail_corridor": {"rail_signals", "rail_msgs_py", "rail_world", "rail_wayside", "rail_onboard"},
 }
-SIGNALS_MAY_USE = {"numpy", "scipy"}
+SIGNALS_MAY_USE = {"numpy", "scipy", "numba"}
 MODULES = sorted(SRC.glob("*/*/**/*.py"))
 
 

@@ -12,10 +12,10 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
 from rail_corridor.run.external_traffic import FULL_NAME, ExternalTrafficRecorder
+from rail_msgs_py.context import CorridorContext
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.stamps import clock_to_cdr
-from rail_msgs_py.tap import TappedContext
 from rail_msgs_py.topics.tick import CLOCK, DONE, FAILED, FINISHED, READY
 from rail_msgs_py.topics.topic import Topic
 
@@ -42,7 +42,7 @@ def told() -> Told:
 @pytest.fixture
 def context(told: Told, ros_domain: int) -> Iterator[Any]:
     """Return a context with a tap, in the domain of the graph."""
-    made = TappedContext(told)
+    made = CorridorContext(told)
     rclpy.init(context=made, domain_id=ros_domain, signal_handler_options=SignalHandlerOptions.NO)
     yield made
     rclpy.try_shutdown(context=made)
@@ -56,7 +56,7 @@ def test_what_is_told_is_what_others_receive(graph: Any, context: Any, told: Tol
     done = node.stream_out(DONE, node="/world/radio_medium")
     tick, end = node.publisher(CLOCK), node.publisher(FINISHED)
     failed = node.publisher(FAILED)
-    graph.wait(lambda: tick.get_subscription_count() and node._connections[0].made())
+    graph.wait(lambda: tick.get_subscription_count() and not node.lacking())
     for stamp_ns in (0, 100_000_000):
         tick.publish(clock_to_cdr(stamp_ns))
         done(header_to_cdr(stamp_ns))
@@ -70,11 +70,6 @@ def test_what_is_told_is_what_others_receive(graph: Any, context: Any, told: Tol
     assert deserialize_message(raw, FINISHED.type) == message == finished[0]
     assert "/failed" not in told.messages
     node.destroy_node()
-
-
-def test_without_a_tap_publishers_are_those_of_ros(graph: Any) -> None:
-    node = graph.add(CorridorNode("world", "/", context=graph.context, services=False))
-    assert isinstance(node.publisher(CLOCK), rclpy.publisher.Publisher)
 
 
 def test_a_bystander_tells_what_a_stranger_publishes(graph: Any) -> None:

@@ -55,8 +55,8 @@ def table(*names: str) -> bytes:
             Float64MultiArray,
             Waveform(STAMP_NS, 4e6, 2.4e9, 1, np.ones((2, 7), dtype=np.complex128)).to_cdr(),
         ),
-        (UInt8MultiArray, telegrams(STAMP_NS)),
-        (UInt8MultiArray, telegrams(STAMP_NS, [(3, bytes(FRAME_BYTES))])),
+        (UInt8MultiArray, telegrams(STAMP_NS).to_cdr()),
+        (UInt8MultiArray, telegrams(STAMP_NS, [(3, bytes(FRAME_BYTES))]).to_cdr()),
     ],
     # Not the bytes themselves: what CDR fills gaps with is any.
     ids=lambda value: value.__name__ if isinstance(value, type) else f"{len(value)} bytes",

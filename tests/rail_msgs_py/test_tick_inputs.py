@@ -37,8 +37,14 @@ class Recorder:
         self._timers: list[Callable[[], None]] = []
         self.ticks: list[tuple[int, dict[str, Any]]] = []
 
-    def stream_in(self, topic: Topic, callback: Callable[[bytes], None], **parts: object) -> None:
-        self.feed[topic.name(**parts)] = callback
+    def blocks_in(
+        self,
+        topic: Topic,
+        decode: Callable[[bytes], tuple[int, Any]],
+        callback: Callable[[int, Any], None],
+        **parts: object,
+    ) -> None:
+        self.feed[topic.name(**parts)] = lambda raw: callback(*decode(raw))
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         self.listens.append(topic)
@@ -52,6 +58,9 @@ class Recorder:
 
     def every(self, period_s: float, callback: Callable[[], None]) -> None:
         self._timers.append(callback)
+
+    def at_tick(self, stamp_ns: int) -> None:
+        """Take the time; the health of a node is tested elsewhere."""
 
     def steady_s(self) -> float:
         return self.now_s

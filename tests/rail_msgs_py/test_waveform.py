@@ -143,7 +143,7 @@ def test_cut_short_bytes_are_refused() -> None:
 @given(waveforms(), st.integers(0, 10**15))
 def test_a_repeated_block_changes_nothing_but_its_stamp(block: Waveform, stamp_ns: int) -> None:
     again = Waveform(stamp_ns, block.sample_rate_hz, block.carrier_hz, block.channel, block.samples)
-    assert_same(Waveform.from_cdr(RepeatedBlock(block).at(stamp_ns)), again)
+    assert_same(Waveform.from_cdr(RepeatedBlock(block).at(stamp_ns).to_cdr()), again)
 
 
 def test_silence_has_a_channel_but_no_sample_and_no_power() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rail_signals.delay import fractional_delay, repetition, through_paths
+from rail_signals.delay import fractional_delay, repetition
 from rail_signals.ranging.signal import RangingSignal, modulate
 
 
@@ -51,26 +51,6 @@ def test_a_block_that_differs_in_one_sample_does_not_repeat() -> None:
     block = np.tile(np.exp(1j * np.arange(8)), 4)
     block[-1] += 1e-15
     assert repetition(block) == repetition(block, 8) == 32
-
-
-@pytest.mark.parametrize("period", [32, 64, 320])
-def test_one_period_or_the_whole_block_arrive_alike(period: int) -> None:
-    rng = np.random.default_rng(period)
-    one = rng.normal(size=(3, period, 2)) @ [1, 1j]
-    whole = np.tile(one, 320 // period)
-    path = {
-        "delay_s": np.array([0.0, 3.3e-7, 1e-5]),
-        "shift_hz": np.array([0.0, -2e3, 5e3]),
-        "gain": np.array([1.0, 1j, 1e-3]),
-        "sample_rate_hz": 4e6,
-    }
-    arrived = through_paths(np.fft.fft(one), 320, **path)
-    np.testing.assert_allclose(
-        arrived, through_paths(np.fft.fft(whole), 320, **path), rtol=0, atol=2e-6
-    )
-    turn = np.exp(2j * np.pi * path["shift_hz"][:, None] / 4e6 * (np.arange(320) - 159.5))
-    expected = fractional_delay(whole, path["delay_s"], 4e6) * turn * path["gain"][:, None]
-    np.testing.assert_allclose(arrived, expected, rtol=0, atol=2e-6)
 
 
 def test_wrong_input() -> None:

@@ -1,4 +1,4 @@
-"""What a run sends arrives: a report that lags loses nothing, and who joins late gets the newest."""
+"""What a run sends arrives: a report that lags loses nothing, a late reader gets the newest."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import socket
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import rclpy
@@ -16,6 +16,7 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from .namesakes import NameTakenError, sole_bearer
 from .parameters import ParameterError
 
 # In these wheels the events executor fires no callback without a finite time-out.
@@ -41,6 +42,9 @@ def spin(context: Any, nodes: Iterable[Any], until: Future | None = None) -> int
 
     for node in nodes:
         executor.add_node(node)
+    delivery = getattr(context, "delivery", None)
+    if delivery is not None:
+        delivery.settle(executor)
     try:
         with signals_to(on_signal):
             executor.spin_until_future_complete(stop, timeout_sec=FOREVER_S)
@@ -85,19 +89,21 @@ def signals_to(handle: Callable[[int], None]) -> Iterator[None]:
 def run_node(make: Callable[[], Any]) -> None:
     """Entry point of a node on its own: arguments, spinning, a clean end.
 
-    Wrong parameters end with one line and exit code 2.
+    Wrong parameters, and a name that another node has, end with one line and exit code 2.
     """
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = make()
-    except (ParameterError, ValueError, OSError) as error:
+        with ExitStack() as held:
+            node = make()
+            held.callback(node.destroy_node)
+            held.enter_context(sole_bearer(node))
+            if hasattr(node, "switch_on"):
+                node.switch_on()
+            spin(rclpy.get_default_context(), [node])
+    except (ParameterError, NameTakenError, ValueError, OSError) as error:
         print(str(error).splitlines()[0], file=sys.stderr)
-        rclpy.shutdown()
         sys.exit(2)
-    if hasattr(node, "switch_on"):
-        node.switch_on()
-    try:
-        spin(rclpy.get_default_context(), [node])
+    except KeyboardInterrupt:
+        sys.exit(130)
     finally:
-        node.destroy_node()
         rclpy.try_shutdown()

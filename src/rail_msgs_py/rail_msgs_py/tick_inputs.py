@@ -8,7 +8,8 @@ from typing import Any, Literal
 from rail_msgs_py.topics.tick import CLOCK
 from rail_msgs_py.topics.topic import Topic
 
-from .decoders import Decoder, bare_stamp
+from .decoders import bare_stamp
+from .delivery import Decoder
 from .failures import TickWatch
 from .inbox import TickInbox
 
@@ -87,14 +88,13 @@ class TickInputs:
         self._inbox.open(port)
         inbox, put, advance, begin = self._inbox, self._inbox.put, self._advance, self._begin_tick
 
-        def receive(raw: bytes) -> None:
-            stamp_ns, item = decode(raw)
+        def receive(stamp_ns: int, item: Any) -> None:
             put(stamp_ns, port, item)
             begin()
             if inbox.complete:
                 advance()
 
-        self._node.stream_in(topic, receive, **parts)
+        self._node.blocks_in(topic, decode, receive, **parts)
         return port
 
     def port(
@@ -132,13 +132,12 @@ class TickInputs:
         inbox, put, advance = self._inbox, self._inbox.put, self._advance
 
         # Run for every message: whatever can be looked up before is.
-        def receive(raw: bytes) -> None:
-            stamp_ns, item = decode(raw)
+        def receive(stamp_ns: int, item: Any) -> None:
             put(stamp_ns + delay_ns, port, item)
             if inbox.complete:
                 advance()
 
-        self._node.stream_in(topic, receive, **parts)
+        self._node.blocks_in(topic, decode, receive, **parts)
         return port
 
     def internal_port(

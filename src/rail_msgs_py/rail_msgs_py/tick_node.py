@@ -15,6 +15,9 @@ A node says its parameters by a frozen dataclass, opens its ports in `setup`, an
         def on_tick(self, stamp_ns: int, items: Mapping[str, Any]) -> None:
             self._send(stamp_ns, self._filter.update(items.get(self._received)))
 
+A node that is renamed, or moved into another namespace, by remapping rules takes the topics below
+its own name along.
+
 Media add what they share in `rail_world.medium_node`.
 """
 
@@ -22,12 +25,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, ClassVar, Generic, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, get_args
 
 from .node import CorridorMixin, CorridorNode, Equipment, Services
 from .parameters import ParameterError, declare
 from .standalone import run_node
 from .tick_inputs import TickInputs
+
+if TYPE_CHECKING:
+    from .topics.topic import Topic
+
+#: Namespaces that are of no train and no site.
+_COMMON = ("", "/", "/world", "/wayside")
 
 Parameters = TypeVar("Parameters")
 
@@ -82,6 +91,8 @@ class _Kind(CorridorMixin, Generic[Parameters]):
             services=services,
         )
         self._p = declare(self, self.parameter_type)
+        if not self.place and self.default_namespace not in _COMMON:
+            raise ParameterError(f"{self.get_name()}: __ns: '/': names neither a train nor a site")
         try:
             self._build()
         except ValueError as error:
@@ -98,6 +109,23 @@ class _Kind(CorridorMixin, Generic[Parameters]):
     def place(self) -> str:
         """Train or site that the node belongs to: the last level of its namespace."""
         return str(self.get_namespace()).rpartition("/")[2]
+
+    @cached_property
+    def listed_name(self) -> str:
+        """Full name under which the table of topics has this node: that of its kind at its place.
+
+        It is the actual one unless remapping rules say otherwise.
+        """
+        if self.default_namespace in _COMMON:
+            return f"{self.default_namespace.rstrip('/')}/{self.default_name}"
+        return f"{self.default_namespace.rpartition('/')[0]}/{self.place}/{self.default_name}"
+
+    def name_of(self, topic: Topic, **parts: object) -> str:
+        """Name of a topic; one below the listed name of the node is below its actual one."""
+        listed = topic.name(**parts)
+        if not listed.startswith(f"{self.listed_name}/"):
+            return listed
+        return f"{self.get_fully_qualified_name()}{listed[len(self.listed_name) :]}"
 
     @cached_property
     def inputs(self) -> TickInputs:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
+from .delivery import ViewDecoder
 from .stamps import CDR_LITTLE_ENDIAN, NANOSECONDS, seconds_to_ns
 
 HEADER_VALUES: Final = 4
@@ -59,6 +60,11 @@ class Waveform:
     carrier_hz: float
     channel: int
     samples: NDArray[np.complex128]
+
+    @property
+    def first(self) -> Waveform:
+        """The block itself; see `RepeatedWaveform`."""
+        return self
 
     @cached_property
     def silent(self) -> bool:
@@ -192,15 +198,20 @@ def silent_stamp_ns(raw: bytes) -> int | None:
 
 
 class BlockReader:
-    """Reads the blocks of one port; one that is sent again is the very same object.
+    """Decoder of the blocks of one port; one that is sent again is the very same object.
 
-    So that a reader can tell by identity that it need not do its work again.
+    So that a reader can tell by identity that it need not do its work again. The view is as from
+    `Waveform.from_cdr`, with the stamp of when it was first sent.
     """
 
     def __init__(self) -> None:
         self._layout = self._rest = b""
         self._length = -1
         self._last: Waveform | None = None
+
+    def decoder(self) -> ViewDecoder[Waveform]:
+        """Stamp [ns] and block of a message."""
+        return ViewDecoder(self.read, lambda view: (view.stamp_ns, view.first))
 
     def read(self, raw: bytes) -> tuple[int, Waveform]:
         """Stamp [ns] and view of a serialised block.
@@ -221,14 +232,43 @@ class BlockReader:
         return self._last.stamp_ns, self._last
 
 
+@dataclass(frozen=True, eq=False)
+class RepeatedWaveform:
+    """A block that is sent again: nothing but its stamp is new.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Simulated time of the tick.
+    first : Waveform
+        The block, with the stamp of when it was first sent.
+    before, after : bytes
+        Of its serialised form, what stands around the stamp.
+    """
+
+    stamp_ns: int
+    first: Waveform
+    before: bytes
+    after: bytes
+
+    def to_cdr(self) -> bytes:
+        """Serialised form."""
+        return b"".join((self.before, _STAMP.pack(self.stamp_ns / NANOSECONDS), self.after))
+
+
+#: A block as it is sent, for the first time or again.
+WaveformView = Waveform | RepeatedWaveform
+
+
 class RepeatedBlock:
     """A block that a transmitter sends again every tick with nothing new but its stamp."""
 
     def __init__(self, block: Waveform) -> None:
         raw = block.to_cdr()
+        self._first = block
         self._before = raw[: _PREFIX.size]
         self._after = raw[_PREFIX.size + 8 :]
 
-    def at(self, stamp_ns: int) -> bytes:
-        """Serialised block of the tick at ``stamp_ns``."""
-        return b"".join((self._before, _STAMP.pack(stamp_ns / NANOSECONDS), self._after))
+    def at(self, stamp_ns: int) -> RepeatedWaveform:
+        """Block of the tick at ``stamp_ns``."""
+        return RepeatedWaveform(stamp_ns, self._first, self._before, self._after)

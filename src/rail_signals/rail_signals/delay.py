@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rail_signals.arrays import ComplexArray, FloatArray
 
-from .phasors import cis, rotation
+from .phasors import cis
 
 
 def fractional_delay(blocks: ArrayLike, delay_s: ArrayLike, sample_rate_hz: float) -> ComplexArray:
@@ -47,8 +46,13 @@ def fractional_delay(blocks: ArrayLike, delay_s: ArrayLike, sample_rate_hz: floa
     delay = np.asarray(delay_s, dtype=np.float64)
     if not np.isfinite(delay).all():
         raise ValueError("delay_s must be finite")
-    ramp = _phase_ramp(delay * sample_rate_hz, x.shape[-1])
-    return np.fft.ifft(np.fft.fft(x) * ramp)
+    return delayed(np.fft.fft(x), delay, sample_rate_hz)
+
+
+def delayed(spectra: ComplexArray, delay_s: FloatArray, sample_rate_hz: float) -> ComplexArray:
+    """Blocks [..., samples] of the transforms of blocks, delayed as by `fractional_delay`."""
+    ramp = _phase_ramp(delay_s * sample_rate_hz, spectra.shape[-1])
+    return np.fft.ifft(spectra * ramp)
 
 
 def repetition(block: ComplexArray, guess: int = 0) -> int:
@@ -79,53 +83,8 @@ def _repeats(block: ComplexArray, count: int) -> bool:
     return bool(block[0] == block[count] and (block[:-count] == block[count:]).all())
 
 
-def through_paths(
-    spectra: ComplexArray,
-    samples: int,
-    *,
-    delay_s: FloatArray,
-    shift_hz: FloatArray,
-    gain: ComplexArray,
-    sample_rate_hz: float,
-) -> NDArray[np.complex64]:
-    """What arrives over many paths at once: delayed as by `fractional_delay`, shifted, scaled.
-
-    A block that repeats within the window, as a steady tone does, is delayed as one period.
-    The result is in single precision, whose rounding lies 140 dB below the signal.
-
-    Parameters
-    ----------
-    spectra : complex128 [path, period]
-        Transform of one period of what each path carries; overwritten.
-    samples : int
-        Length of a block, a multiple of the period.
-    delay_s, shift_hz : float [path]
-        Delay [s] and frequency shift [Hz]; the shift leaves the phase at mid-block alone.
-    gain : complex [path]
-        Amplitude and carrier phase.
-    sample_rate_hz
-        Complex sample rate [Hz].
-
-    Returns
-    -------
-    complex64 [path, samples]
-    """
-    paths, period = spectra.shape
-    spectra *= _phase_ramp(delay_s * sample_rate_hz, period, gain)
-    # In double precision, where a row does not depend on the others that are transformed with it.
-    arrived = np.fft.ifft(spectra).astype(np.complex64)
-    turning: Any = rotation(shift_hz / sample_rate_hz, samples, np.complex64)
-    turning = turning.reshape(paths, samples // period, period)
-    turning *= arrived[:, None, :]
-    return np.asarray(turning.reshape(paths, samples))
-
-
-def _phase_ramp(
-    delay_samples: FloatArray,
-    samples: int,
-    gain: ComplexArray | None = None,
-) -> ComplexArray:
-    """``gain exp(-j 2 pi k d / N)`` over the signed bin numbers k in transform order.
+def _phase_ramp(delay_samples: FloatArray, samples: int) -> ComplexArray:
+    """``exp(-j 2 pi k d / N)`` over the signed bin numbers k in transform order.
 
     Two short tables and their outer product replace N complex exponentials.
     """
@@ -134,8 +93,6 @@ def _phase_ramp(
     first = np.fft.fftfreq(samples, 1 / samples)[::fine_count]
     fine = cis(turn * np.arange(fine_count))
     coarse = cis(turn * first)
-    if gain is not None:
-        coarse *= gain[..., None]
     shape = (*turn.shape[:-1], samples)
     return np.asarray((coarse[..., :, None] * fine[..., None, :]).reshape(shape))
 

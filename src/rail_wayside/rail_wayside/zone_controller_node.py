@@ -77,9 +77,14 @@ def zone_map_of(p: ZoneControllerParameters) -> ZoneMap:
         If the arrays do not fit together.
     """
     count = len(p.zones)
+    if count == 0:
+        raise ParameterError("zones: (): at least one is needed")
     for name in ("sites", "tracks", "starts_m", "ends_m", "table_sizes"):
         if len(getattr(p, name)) != count:
             raise ParameterError(f"{name}: {len(getattr(p, name))} entries for {count} zones")
+    for name, other in (("follows_to", "follows_from"), ("entry_zones", "trains")):
+        if len(getattr(p, name)) != len(getattr(p, other)):
+            raise ParameterError(f"{name}: {getattr(p, name)}: does not go with {other}")
     total = sum(p.table_sizes)
     if not len(p.table_chainage_m) == len(p.table_distance_m) == total:
         raise ParameterError(f"table_chainage_m: {len(p.table_chainage_m)} points, not {total}")
@@ -108,7 +113,7 @@ class ZoneControllerNode(
         p = self._p
         zone_map = zone_map_of(p)
         self._tracker = ZoneTracker(zone_map, list(zip(p.trains, p.entry_zones, strict=True)))
-        self._positions = {name: self.publisher(POSITION, train=name).publish for name in p.trains}
+        self._positions = {name: self.publisher(POSITION, train=name).send for name in p.trains}
         self._writers: dict[tuple[str, str], PositionWriter] = {}
         # In the order of their names, so that sums over them are repeatable.
         self._zone_ports = {

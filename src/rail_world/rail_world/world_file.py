@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.quantities import ODOMETER_ERROR, SEED, TICK
 from rail_world.line.description import JunctionDescription, TrackDescription
 from rail_world.line.description_base import range_of
@@ -63,10 +64,21 @@ class WorldFile(BaseModel):
 
 
 def read_world_file(path: str) -> WorldFile:
-    """Read and validate a world file.
+    """Read and validate the world file that a parameter names.
 
     Raises
     ------
-    OSError, pydantic.ValidationError
+    ParameterError
+        If there is none, or it describes no world.
     """
-    return WorldFile.model_validate_json(Path(path).read_bytes())
+    try:
+        if not path:
+            raise OSError(0, "a file is needed")
+        return WorldFile.model_validate_json(Path(path).read_bytes())
+    except OSError as error:
+        reason = error.strerror or "cannot be read"
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        reason = f"{where}: {first['msg']}" if where else first["msg"]
+    raise ParameterError(f"world_file: {path!r}: {reason}")

@@ -25,7 +25,6 @@ from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.quantities import CAB_SIGNALS, END_WHEN_ARRIVED, GIVE_UP
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
 from rail_msgs_py.table import values_from_cdr
-from rail_msgs_py.tap import raw_publish
 from rail_msgs_py.tick_node import TickNode
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.topics.tick import (
@@ -105,9 +104,9 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._finished = False
         names = self._traffic.names
         self._clock_publisher = self.publisher(CLOCK)
-        self._begin_tick = raw_publish(self._clock_publisher)
+        self._begin_tick = self._clock_publisher.send
         self._state = self.table_out(STATE, names)
-        self._truth = [self.publisher(TRUTH, train=name).publish for name in names]
+        self._truth = [self.publisher(TRUTH, train=name).send for name in names]
         self._truth_writers: dict[tuple[str, str], PositionWriter] = {}
         self._finish = self.publisher(FINISHED)
         self._supervisors = {
@@ -300,8 +299,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
     def _tick_over(self) -> None:
         self._begun_s = float("inf")
         self._inbox.close(self._tick * self._tick_ns)
-        least_s = 0.0 if self._inbox.awaits_anything else _UNANSWERED_S
-        wait_s = max(self._wait_s(), least_s)
+        wait_s = max(self._wait_s(), 0.0 if self._inbox.awaits_anything else _UNANSWERED_S)
         if wait_s <= 0.0:
             self._next_tick()
             return

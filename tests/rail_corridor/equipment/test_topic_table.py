@@ -131,7 +131,7 @@ def test_what_late_joiners_must_learn_is_latched() -> None:
     latched = (READY, FAILED, FINISHED, CORRIDOR_PATH)
     assert all(t.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for t in latched)
     assert STREAM.durability == DurabilityPolicy.VOLATILE
-    # kept history would give who joins later the oldest estimate first
+    # who joins late begins with the newest, not with one of long ago
     assert ESTIMATE.durability == DurabilityPolicy.VOLATILE
     assert OBSERVED.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
     # one message of each node at least, and every part of the map

@@ -84,8 +84,10 @@ def test_everything_arrives_as_it_was(pipe: tuple[int, int]) -> None:
     ring = RepeatedBlock(Waveform(0, 4e6, 2.4e9, 1, np.full((1, 960), 0.5 + 0.1j)))
     quiet = RepeatedBlock(silence(0, 4e6, 2.4e9, 1))
     other = RepeatedBlock(Waveform(0, 4e6, 2.4e9, 1, np.full((1, 960), 0.25j)))
-    sent = [ring.at(t) for t in range(5)] + [quiet.at(5), ring.at(6), ring.at(7)]
-    sent += [other.at(8), other.at(9), block(10, 1.0, 480), block(11, 2.0), block(12, 2.0, 961)]
+    again = [ring.at(t) for t in range(5)] + [quiet.at(5), ring.at(6), ring.at(7)]
+    again += [other.at(8), other.at(9)]
+    sent = [view.to_cdr() for view in again]
+    sent += [block(10, 1.0, 480), block(11, 2.0), block(12, 2.0, 961)]
     clocks = [clock_to_cdr(t) for t in range(len(sent))]
     for stamp, raw in zip(clocks, sent, strict=True):
         clock(stamp)
@@ -101,7 +103,7 @@ def test_a_block_that_repeats_travels_as_its_stamp(pipe: tuple[int, int]) -> Non
     assert send
     ring = RepeatedBlock(Waveform(0, 4e6, 2.4e9, 1, np.full((1, 960), 0.5)))
     for tick in range(6):
-        send(ring.at(tick))
+        send(ring.at(tick).to_cdr())
     send(block(6, 3.0))
     tap.close()
     far.read_all()

@@ -17,7 +17,7 @@ def test_there_and_back(frames: tuple[tuple[int, bytes], ...]) -> None:
 
 
 def test_stock_tools_can_read_it() -> None:
-    message = deserialize_message(telegrams(5, FRAMES), UInt8MultiArray)
+    message = deserialize_message(telegrams(5, FRAMES).to_cdr(), UInt8MultiArray)
     assert [(dim.label, dim.size) for dim in message.layout.dim] == [("telegram", 3), ("byte", 66)]
     assert bytes(message.data[10:74]) == FRAMES[0][1]
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.doppler.shift_cost import ReceivedShift, ShiftCost, Unknowns, inverse
+from rail_signals.doppler.shift_cost import ShiftCost
+from rail_signals.doppler.shift_kernel import Unknowns, inverse
 from rail_signals.doppler.surveyed_line import SurveyedLine
 from rail_signals.doppler.tone_plan import TonePlan
 
@@ -23,11 +24,8 @@ def cost_of(noise_hz: np.ndarray) -> ShiftCost:
     way = v * PLAN.averaging_time_s
     rate = line.rates(STATIONS, [at - way, at + way]).mean(axis=0)
     shift = per_mps * v * rate + delta + noise_hz
-    heard = [
-        ReceivedShift(*station, float(z), 4.0, per_mps, 1.0)
-        for station, z in zip(STATIONS.tolist(), shift, strict=True)
-    ]
-    return ShiftCost(line, heard, PLAN.averaging_time_s, (40.0, 1e-4), (0.0, 1e-6))
+    rows = [[*station, z, 4.0, per_mps, 1.0] for station, z in zip(STATIONS, shift, strict=True)]
+    return ShiftCost(line, np.array(rows), PLAN.averaging_time_s, (40.0, 1e-4, 0.0, 1e-6))
 
 
 def test_the_truth_costs_what_the_priors_do() -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rail_signals.delay import fractional_delay
-from rail_signals.phasors import rotation
+from rail_signals.phasors import cis
 from rail_signals.ranging.bounds import two_way_range_variance_bound
 from rail_signals.ranging.phase_range import range_to_phase_rad, unambiguous_range_m
 from rail_signals.ranging.receiver import FmToneReceiver
@@ -23,6 +23,11 @@ SIGNAL = RangingSignal()
 TWO_TONES = RangingSignal((375e3, 37.5e3), (375e3, 37.5e3))
 DELAY_S = 1e-6
 NOISE_MW = 1e-10
+
+
+def turning(cycles_per_sample: float, samples: int) -> Burst:
+    """Return a frequency shift that leaves the phase at mid-burst alone."""
+    return cis(2.0 * math.pi * cycles_per_sample * (np.arange(samples) - 0.5 * (samples - 1)))
 
 
 def noise(
@@ -60,7 +65,7 @@ class Chain:
         # Any carrier phase and an offset of Doppler and oscillators.
         turn = np.exp(2j * math.pi * self._rng.random())
         shift_hz = self._rng.uniform(-1e3, 1e3)
-        arrived = arrived * rotation(shift_hz / self._signal.sample_rate_hz, arrived.size) * turn
+        arrived = arrived * turning(shift_hz / self._signal.sample_rate_hz, arrived.size) * turn
         amplitude = math.sqrt(snr * NOISE_MW)
         return np.asarray(amplitude * arrived + noise(self._rng, samples=arrived.size))
 
@@ -200,7 +205,7 @@ def two_trains(
     for range_m, level_db in ((first_m, 0.0), (second_m, second_db)):
         turn = 10.0 ** (level_db / 20.0) * np.exp(2j * math.pi * rng.random())
         train = turn * returned(range_m)
-        total += train * rotation(rng.uniform(-1e3, 1e3) / SIGNAL.sample_rate_hz, train.size)
+        total += train * turning(rng.uniform(-1e3, 1e3) / SIGNAL.sample_rate_hz, train.size)
     return total
 
 

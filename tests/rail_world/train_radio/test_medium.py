@@ -16,9 +16,11 @@ from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.train_radio.mimo_fading import MimoFading
 from rail_signals.train_radio.path_loss import path_loss_db
 from rail_world.train_radio.description import BaseStation, CbtcDescription, CbtcFault, LossSection
-from rail_world.train_radio.fading import LinkFading, node_count
-from rail_world.train_radio.links import COLUMNS, Run
+from rail_world.train_radio.fading_kernel import node_count, scattered
+from rail_world.train_radio.links import COLUMNS
 from rail_world.train_radio.medium import Burst, CbtcMedium, Links
+
+from .pure_fading import gains
 
 RATE_HZ, TICK_S, SAMPLES = 400e3, 0.1, 40_000
 DOWN_HZ, UP_HZ = {1: 2.412e9, 2: 2.422e9}, {1: 2.452e9, 2: 2.462e9}
@@ -222,19 +224,16 @@ def test_co_channel_base_stations_add() -> None:
 # Fading -----------------------------------------------------------------------------------
 
 
-def run(speed_mps: float, distance_m: float = 300.0) -> Run:
-    return Run(12_345.6, speed_mps, 0.0, distance_m, -0.9, (1.0, 1.0), TICK_S)
-
-
-def link(rician_factor: float = 0.0) -> LinkFading:
-    return LinkFading(np.random.default_rng(5), 2, 2, DOWN_HZ[1], rician_factor)
-
-
-def test_the_sum_wave_by_wave_is_the_field() -> None:
-    whole = MimoFading(np.random.default_rng(4), 2, 2, 0.125)
-    few = MimoFading(np.random.default_rng(4), 2, 2, 0.125)
-    place = 54_321.0 + np.linspace(0.0, 7.0, 40)
-    np.testing.assert_allclose(few.at_few(place), whole.at(place), atol=1e-6)
+def test_the_waves_add_up_to_the_field() -> None:
+    field = MimoFading(np.random.default_rng(4), 2, 2, 0.125)
+    place_m = 54_321.0 + np.linspace(0.0, 7.0, 40)
+    turns_per_m, start = field.waves
+    room = np.empty((2, turns_per_m.shape[-1]))
+    for rx, tx in np.ndindex(2, 2):
+        waves = turns_per_m[rx, tx], start[rx, tx].real.copy(), start[rx, tx].imag.copy()
+        for kernel in (scattered, scattered.py_func):
+            found = [complex(*kernel(*waves, at_m, room)) for at_m in place_m]
+            np.testing.assert_allclose(found, field.at(place_m)[rx, tx], atol=1e-6)
 
 
 @pytest.mark.parametrize("speed_mps", [0.5, 20.0, 90.0, 140.0])
@@ -243,13 +242,18 @@ def test_the_sum_wave_by_wave_is_the_field() -> None:
 def test_gains_between_nodes_err_by_less_than_55_db(
     speed_mps: float, count: int, rician_factor: float
 ) -> None:
-    fading, way = link(rician_factor), run(speed_mps, distance_m=30.0)
-    found = fading.gains(way, 0.02, 0.02 + (count - 1) / RATE_HZ, count)
-    # With one sample there is one node: the sum itself.
-    for index in np.unique(np.linspace(0, count - 1, 40).astype(int)).tolist():
-        time_s = 0.02 + index / RATE_HZ
-        exact = fading.gains(way, time_s, time_s, 1)[..., 0]
-        assert np.abs(found[..., index] - exact).max() < 10.0 ** (-55.0 / 20.0)
+    radio = medium(rician_factor=rician_factor)
+    links = radio.links(3, 0.3, at(1030.0, speed_mps=speed_mps, acceleration_mps2=2.0))
+    begin = 8000
+    time_s = (begin + np.arange(count)) / RATE_HZ
+    exact = gains(1, links, (0, 0, 0), time_s, DOWN_HZ[1], rician_factor)
+    amplitude = 10.0 ** (links.gain_db[0, 1, 0, 0] / 20.0)
+    quiet = hear(radio, links, (begin, begin + count), sent={})
+    for antenna in (0, 1):
+        sent = {0: [Burst(begin, 1e9 * ones(count=count, only=antenna).samples)]}
+        heard = hear(radio, links, (begin, begin + count), sent=sent) - quiet
+        error = np.abs(1e-9 * heard - exact[:, antenna]).max()
+        assert error < 10.0 ** (-55.0 / 20.0) * amplitude
 
 
 def test_enough_nodes_are_taken() -> None:

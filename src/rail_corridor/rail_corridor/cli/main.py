@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 # One thread for linear algebra: two cores are shared by many nodes, and the bits of a sum must
 # not depend on how many threads computed it. Has to be set before NumPy is loaded.
@@ -28,6 +28,8 @@ from .usage import (
 )
 from .workshop import add_to as add_workshop
 
+Part = Literal["wayside", "onboard", "report"]
+
 if TYPE_CHECKING:
     from rail_corridor.scenario.model import Scenario
 
@@ -39,7 +41,7 @@ app = typer.Typer(
 )
 
 _PLACEMENTS: tuple[Literal["one", "site", "node"], ...] = ("one", "site", "node")
-_PARTS: tuple[Literal["wayside", "onboard"], ...] = ("wayside", "onboard")
+_PARTS: tuple[Part, ...] = get_args(Part)
 
 SeedOption = Annotated[
     int | None, typer.Option("--seed", help="Seed of every random draw.", metavar="N")
@@ -114,7 +116,8 @@ def run(
         str | None,
         typer.Option(
             "--only",
-            help="Run one part here, the other on another host: wayside, onboard.",
+            help="Run one part here, the others elsewhere: wayside, onboard, or report, which "
+            "runs no node.",
             metavar="PART",
         ),
     ] = None,
@@ -179,8 +182,8 @@ def run(
 
     from rich.console import Console
 
-    from rail_corridor.run.launcher import RunOptions
     from rail_corridor.run.launcher import run as run_corridor
+    from rail_corridor.run.options import RunOptions
 
     options = RunOptions(
         rate,
@@ -215,6 +218,39 @@ def check(
     from rail_corridor.loading.summary import print_summary
 
     print_summary(loaded, Console())
+
+
+@app.command()
+def plan(
+    scenario: ScenarioArgument,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            "--write",
+            help="Write what it takes to start every node by hand: the world, a ROS parameter "
+            "file for each node, and their command lines.",
+            metavar="DIR",
+        ),
+    ] = None,
+    duration: DurationOption = None,
+    seed: SeedOption = None,
+    track: TrackOption = None,
+    trains: TrainsOption = None,
+    zone_length: ZoneOption = None,
+    reverse: ReverseOption = False,
+) -> None:
+    """Show the nodes of a scenario, or write their parameter files; starts nothing."""
+    if write is not None:
+        if write.exists() and not write.is_dir():
+            raise UsageError(f"--write: {write}: is not a directory")
+        check_writable("--write", write / "any" if write.is_dir() else write)
+    loaded = _load(scenario, seed, duration, track, trains, zone_length, reverse)
+
+    from rich.console import Console
+
+    from .plans import show_plan
+
+    raise typer.Exit(show_plan(loaded, write, Console()))
 
 
 @app.command()

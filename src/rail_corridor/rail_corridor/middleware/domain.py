@@ -20,8 +20,8 @@ def sole_corridor(part: str | None = None, directory: Path | None = None) -> Ite
 
     Parameters
     ----------
-    part : 'wayside' or 'onboard', optional
-        The one part that runs here; both may run on one host, each once.
+    part : 'wayside', 'onboard' or 'report', optional
+        The one part that runs here; all may run on one host, each once.
     directory : Path, optional
         Where the lock files are; the system's directory for temporary files if not given.
 

@@ -27,12 +27,22 @@ from rail_world.world_file import WorldFile
 from .world_plan import world_file
 
 Placement = Literal["one", "site", "node"]
+#: What one host may run of a corridor.
+Part = Literal["wayside", "onboard", "report"]
 
 WORLD: Final = "/world"
 #: Full name of the node that reads the run for its report.
 REPORT: Final = "/report"
 #: Participants of one host that discovery on the local host can bring together, with margin.
 MOST_PROCESSES = 26
+
+
+_SIDES: Final[dict[Part | None, tuple[Side, ...]]] = {
+    None: ("world", "wayside", "onboard"),
+    "wayside": ("world", "wayside"),
+    "onboard": ("onboard",),
+    "report": (),
+}
 
 
 @dataclass(frozen=True)
@@ -48,22 +58,25 @@ class Plan:
     records: tuple[RecordSpec, ...]
 
     def groups(
-        self, placement: Placement, only: Side | None = None, external: Iterable[str] = ()
+        self, placement: Placement, only: Part | None = None, external: Iterable[str] = ()
     ) -> dict[str, list[NodeSpec]]:
         """Nodes by process.
 
         Parameters
         ----------
         placement : 'one', 'site' or 'node'
-        only : 'wayside' or 'onboard', optional
-            Part of the corridor that this host runs; the world is with the wayside.
+        only : 'wayside', 'onboard' or 'report', optional
+            Part of the corridor that this host runs; the world is with the wayside, and the report
+            is no node of the plan.
         external : iterable of str
             Full names of nodes that somebody else runs; the corridor waits for them.
         """
         others = set(external)
-        sides = {None: None, "wayside": ("world", "wayside"), "onboard": ("onboard",)}[only]
-        nodes = [spec for spec in self.nodes if sides is None or spec.side in sides]
+        sides = _SIDES[only]
+        nodes = [spec for spec in self.nodes if spec.side in sides]
         nodes = [spec for spec in nodes if spec.name not in others]
+        if not nodes:
+            return {}
         if placement == "one":
             return {"corridor": nodes}
         groups: dict[str, list[NodeSpec]] = {}

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.equipment.registry import node_kinds
+from rail_signals.compiled import preload_kernels
 
 if TYPE_CHECKING:
     from rail_msgs_py.tap import Tap
 
-#: With more nodes than this in a process the services are left out.
-MOST_NODES_WITH_SERVICES = 12
+#: With more nodes than this in a process the services are left out until somebody asks for them.
+MOST_NODES_WITH_SERVICES = 24
 
 
 def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:
@@ -54,6 +55,7 @@ def make_nodes(
         if until():
             break
         nodes.append(make_node(spec, context, services))
+    preload_kernels()
     gc.collect()
     gc.freeze()
     return nodes
@@ -84,8 +86,7 @@ def run_nodes(
 
     from rail_msgs_py.standalone import spin
 
-    context = make_context(tap)
-    context.report_reads = report_reads
+    context = make_context(tap, report_reads)
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     nodes = make_nodes(specs, context, switches=switches)
     try:
@@ -110,13 +111,11 @@ def destroy_nodes(nodes: Iterable[Any], within_s: float) -> bool:
     return True
 
 
-def make_context(tap: Tap | None) -> Any:
-    """Context of the nodes of a process."""
-    import rclpy
+def make_context(tap: Tap | None, report_reads: frozenset[str] = frozenset()) -> Any:
+    """Context of the nodes of a process; ``report_reads`` as of `CorridorContext`."""
+    from rail_msgs_py.context import CorridorContext
 
-    from rail_msgs_py.tap import TappedContext
-
-    return rclpy.Context() if tap is None else TappedContext(tap)
+    return CorridorContext(tap, report_reads)
 
 
 def die_with(lifeline: int) -> None:

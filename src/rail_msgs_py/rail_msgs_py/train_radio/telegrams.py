@@ -107,6 +107,6 @@ class Telegrams:
         return {slot: frame for slot, frame in self.frames if 1 <= slot <= slots}
 
 
-def telegrams(stamp_ns: int, frames: Iterable[tuple[int, bytes]] = ()) -> bytes:
-    """Serialised telegrams of a tick."""
-    return Telegrams(stamp_ns, tuple(frames)).to_cdr()
+def telegrams(stamp_ns: int, frames: Iterable[tuple[int, bytes]] = ()) -> Telegrams:
+    """Telegrams of a tick."""
+    return Telegrams(stamp_ns, tuple(frames))

@@ -11,15 +11,16 @@ from math import inf
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from rail_msgs_py.decoders import block
 from rail_msgs_py.doppler import quantities
 from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
-from rail_msgs_py.parameters import parameter
+from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.quantities import DIRECTION_OR_UNKNOWN, TRAIN_START
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import DOPPLER_FIX, DOPPLER_POSITION, REFERENCE_RX
-from rail_msgs_py.waveform import Waveform, silent_stamp_ns
+from rail_msgs_py.waveform import Waveform
 from rail_signals.doppler.receiver import ToneReceiver
 from rail_signals.doppler.solver import Answer, DopplerSolver, NoFixReason
 from rail_signals.doppler.surveyed_line import SurveyedLine
@@ -88,28 +89,26 @@ class DopplerPositionerNode(
     def setup(self) -> None:
         """Open the ports of the train."""
         p, train = self._p, self.place
+        if len(p.line_chainage_m) < 2:
+            raise ParameterError(f"line_chainage_m: {p.line_chainage_m}: needs two points or more")
         self._fix = self.table_out(DOPPLER_FIX, (train,), awaited=p.localizer, train=train)
-        self._position = self.publisher(DOPPLER_POSITION, train=train).publish
+        self._position = self.publisher(DOPPLER_POSITION, train=train).send
         self._writer = PositionWriter(train, p.track)
-        self.stream_in(REFERENCE_RX, self._on_block, train=train)
+        self.blocks_in(REFERENCE_RX, block, self._on_block, train=train)
 
     def start_over(self) -> None:
         """Be where the train is put into service."""
         self._positioner = positioner_of(self._p)
         self._last_ns: int | None = None
 
-    def _on_block(self, raw: bytes) -> None:
-        silent_ns = silent_stamp_ns(raw)
-        block = None if silent_ns is not None else Waveform.from_cdr(raw)
-        stamp_ns = block.stamp_ns if block is not None else silent_ns
-        assert stamp_ns is not None
+    def _on_block(self, stamp_ns: int, received: Waveform | None) -> None:
         self.at_tick(stamp_ns)
         step_s = 0.0 if self._last_ns is None else (stamp_ns - self._last_ns) / NANOSECONDS
         self._last_ns = stamp_ns
         positioner = self._positioner
         answer = Answer(NoFixReason.TOO_FEW_STATIONS)
         if self.switched_on:
-            answer = positioner.locate(None if block is None else block.row, step_s)
+            answer = positioner.locate(None if received is None else received.row, step_s)
         self._publish(stamp_ns, answer, positioner.tones)
 
     def _publish(self, stamp_ns: int, answer: Answer, tones: int) -> None:

@@ -133,7 +133,7 @@ class LocalizerNode(EquipmentNode[LocalizerParameters], name="localizer", namesp
         # Train protection or code supervision waits for it.
         awaited = p.told or bool(p.joints_m)
         self._state = self.table_out(LOCALIZER_STATE, (train,), awaited=awaited, train=train)
-        self._position = self.publisher(LOCALIZER_POSITION, train=train).publish
+        self._position = self.publisher(LOCALIZER_POSITION, train=train).send
         self._writer = PositionWriter(train, p.track)
 
     def start_over(self) -> None:

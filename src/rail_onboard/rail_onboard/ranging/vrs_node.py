@@ -71,7 +71,7 @@ class VrsNode(EquipmentNode[VrsParameters], name="vrs", namespace="/train_1"):
             for channel in sorted(channels)
         }
         self._send = self.stream_out(VRS_TX, train=train)
-        self._channel = self.publisher(VRS_CHANNEL, train=train).publish
+        self._channel = self.publisher(VRS_CHANNEL, train=train).send
         columns = ("downlink", "uplink", *(f"level_{channel}_dbm" for channel in channels))
         self._channel_table = TableWriter((train,), columns)
         self._values = np.zeros((1, len(columns)))
@@ -116,18 +116,18 @@ class VrsNode(EquipmentNode[VrsParameters], name="vrs", namespace="/train_1"):
         self._publish_channel(stamp_ns, levels)
         self._report(stamp_ns, disturbance)
 
-    def _reply(self, stamp_ns: int, estimates: ToneEstimate, row: int) -> bytes:
+    def _reply(self, stamp_ns: int, estimates: ToneEstimate, row: int) -> Waveform:
         uplink = self._selector.uplink
         assert uplink is not None
         lag_rad = reply_lag_rad(estimates.phase_lag_rad[row], self._signal, self._delay_s)
         burst = modulate(self._signal, lag_rad) * self._amplitude
         radio = (self._signal.sample_rate_hz, self._carriers_hz[uplink], uplink)
-        return Waveform(stamp_ns, *radio, burst[None, :]).to_cdr()
+        return Waveform(stamp_ns, *radio, burst[None, :])
 
-    def _silence(self, stamp_ns: int) -> bytes:
+    def _silence(self, stamp_ns: int) -> Waveform:
         uplink = self._selector.uplink or self._p.uplink_channels[0]
         radio = (self._signal.sample_rate_hz, self._carriers_hz[uplink], uplink)
-        return silence(stamp_ns, *radio).to_cdr()
+        return silence(stamp_ns, *radio)
 
     def _publish_channel(self, stamp_ns: int, levels: Mapping[int, float]) -> None:
         self._values[0, 0] = self._selector.downlink or 0

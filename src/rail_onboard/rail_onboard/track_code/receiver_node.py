@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from rail_msgs_py.decoders import block
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_RX
@@ -50,7 +51,7 @@ class TrackCodeReceiverNode(
         self._profile = load_profile(name)
         self._publish = self.table_out(CODE_RECEIVED, (train,), train=train)
         self._values = np.zeros((1, len(CODE_RECEIVED.columns)))
-        self.stream_in(CODE_RX, self._on_block, train=train)
+        self.blocks_in(CODE_RX, block, self._on_block, train=train)
 
     def start_over(self) -> None:
         """Have received nothing on any carrier."""
@@ -61,13 +62,12 @@ class TrackCodeReceiverNode(
         }
         self._selector = CarrierSelector(p.carriers_hz, p.sample_rate_hz, p.least_level_db)
 
-    def _on_block(self, raw: bytes) -> None:
-        block = Waveform.from_cdr(raw)
-        self.at_tick(block.stamp_ns)
+    def _on_block(self, stamp_ns: int, received: Waveform | None) -> None:
+        self.at_tick(stamp_ns)
         values = self._values[0]
         values[:] = 0.0
-        if self.switched_on and not block.silent:
-            samples = np.ascontiguousarray(block.row.real)
+        if self.switched_on and received is not None:
+            samples = np.ascontiguousarray(received.row.real)
             carrier_hz = self._selector.update(samples)
             decisions = {
                 each_hz: receiver.feed(samples) for each_hz, receiver in self._receivers.items()
@@ -76,13 +76,13 @@ class TrackCodeReceiverNode(
             if carrier_hz is not None:
                 values[0] = carrier_hz
                 self._show(decisions[carrier_hz], values)
-        self._publish(block.stamp_ns, self._values)
-        received = bool(values[0])
+        self._publish(stamp_ns, self._values)
+        hears = bool(values[0])
         self.report(
-            DiagnosticStatus.OK if received else DiagnosticStatus.WARN,
+            DiagnosticStatus.OK if hears else DiagnosticStatus.WARN,
             "pick-up",
-            "hears a carrier" if received else "hears no carrier",
-            stamp_ns=block.stamp_ns,
+            "hears a carrier" if hears else "hears no carrier",
+            stamp_ns=stamp_ns,
         )
 
     def _show(self, decisions: list[Any], values: np.ndarray[Any, Any]) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 
+from rail_msgs_py.decoders import samples
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.quantities import GIVE_UP, TICK
 from rail_msgs_py.stamps import NANOSECONDS
@@ -28,6 +29,7 @@ from rail_msgs_py.topics.train_bus import (
 )
 from rail_msgs_py.train_bus import quantities
 from rail_msgs_py.waveform import Waveform, silence
+from rail_signals.arrays import ComplexArray
 from rail_signals.train_bus.faults import KINDS
 from rail_signals.train_bus.tdr.interpretation import Interpretation, interpret
 from rail_signals.train_bus.tdr.measured_trace import step_edge
@@ -77,8 +79,8 @@ class TrainBusMonitorNode(
             sample_period_s=p.rise_time_s / 4.0,
             noise_rms=p.noise_rms,
         )
-        samples = self._instrument.samples_for(self._consist.bus_line().delay_s)
-        self._time_s = self._instrument.grid(samples).time_s
+        length = self._instrument.samples_for(self._consist.bus_line().delay_s)
+        self._time_s = self._instrument.grid(length).time_s
         edge = step_edge(self._time_s, p.rise_time_s)
         self._edges = np.tile(edge, (p.traces, 1)).astype(np.complex128)
         self._tick_ns = round(p.tick_s * NANOSECONDS)
@@ -90,7 +92,7 @@ class TrainBusMonitorNode(
         self._trace = self.publisher(BUS_TRACE, train=train)
         self._verdicts = self.publisher(BUS_VERDICTS, train=train)
         self._trend = self.publisher(BUS_TREND, train=train)
-        self.stream_in(REFLECTOMETER_RX, self._on_block, train=train)
+        self.blocks_in(REFLECTOMETER_RX, samples, self._on_block, train=train)
         self.inputs.clock()
 
     def start_over(self) -> None:
@@ -115,16 +117,15 @@ class TrainBusMonitorNode(
             block = Waveform(stamp_ns, rate_hz, 0.0, 0, self._edges)
         else:
             block = silence(stamp_ns, rate_hz, 0.0, 0)
-        self._send(block.to_cdr())
+        self._send(block)
 
     # Understanding ------------------------------------------------------------------------
 
-    def _on_block(self, raw: bytes) -> None:
-        block = Waveform.from_cdr(raw)
-        if self.switched_on and not block.silent:
-            self._understand(block.stamp_ns, np.ascontiguousarray(block.samples.real))
-        self._state(block.stamp_ns, self._values())
-        self._is_seen(block.stamp_ns, None)
+    def _on_block(self, stamp_ns: int, received: ComplexArray | None) -> None:
+        if self.switched_on and received is not None:
+            self._understand(stamp_ns, np.ascontiguousarray(received.real))
+        self._state(stamp_ns, self._values())
+        self._is_seen(stamp_ns, None)
 
     def _understand(self, stamp_ns: int, rows: NDArray[np.float64]) -> None:
         watch = self._watch_over

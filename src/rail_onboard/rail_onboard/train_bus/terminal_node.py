@@ -13,6 +13,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 
+from rail_msgs_py.decoders import block
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.quantities import GIVE_UP, TICK
 from rail_msgs_py.stamps import NANOSECONDS
@@ -47,6 +48,14 @@ class BusTerminalParameters:
 class BusTerminalNode(EquipmentNode[BusTerminalParameters], name="bus_head", namespace="/train_1"):
     """A terminal as a managed node; switched off it neither speaks nor listens."""
 
+    #: Those of the kind, until its own have been declared.
+    _p = BusTerminalParameters()
+
+    @property
+    def listed_name(self) -> str:
+        """Full name under which the table of topics has this terminal."""
+        return f"/{self.place}/bus_{self._p.end}"
+
     def setup(self) -> None:
         """Open the ports of its end of the train."""
         p, train = self._p, self.place
@@ -61,17 +70,16 @@ class BusTerminalNode(EquipmentNode[BusTerminalParameters], name="bus_head", nam
         self._answer = self.inputs.internal_port("bus", p.medium, delay_ns=self._tick_ns)
         self._send = self.stream_out(BUS_TX, train=train, end=p.end)
         self._link = self.table_out(BUS_LINK, (train,), train=train, end=p.end)
-        self.stream_in(BUS_RX, self._on_block, train=train, end=p.end)
+        self.blocks_in(BUS_RX, block, self._on_block, train=train, end=p.end)
         self.inputs.clock()
 
     def start_over(self) -> None:
         """Have received nothing of the other end."""
         self._terminal = BusTerminal(self._end, self._p.tick_s, self._p.answer_timeout_s)
 
-    def _on_block(self, raw: bytes) -> None:
-        block = Waveform.from_cdr(raw)
-        self._take(block.stamp_ns, None if block.silent else block.row.real)
-        self._answer(block.stamp_ns, None)
+    def _on_block(self, stamp_ns: int, received: Waveform | None) -> None:
+        self._take(stamp_ns, None if received is None else received.row.real)
+        self._answer(stamp_ns, None)
 
     def _take(self, stamp_ns: int, samples: NDArray[np.float64] | None) -> None:
         tick = stamp_ns // self._tick_ns
@@ -98,10 +106,10 @@ class BusTerminalNode(EquipmentNode[BusTerminalParameters], name="bus_head", nam
         """Send the message of the tick."""
         rate_hz = self._frame.sample_rate_hz
         if not self.switched_on:
-            self._send(silence(stamp_ns, rate_hz, 0.0, 0).to_cdr())
+            self._send(silence(stamp_ns, rate_hz, 0.0, 0))
             return
         wave = self._frame.waveform(self._terminal.payload(stamp_ns // self._tick_ns))
-        self._send(Waveform(stamp_ns, rate_hz, 0.0, 0, wave[None].astype(np.complex128)).to_cdr())
+        self._send(Waveform(stamp_ns, rate_hz, 0.0, 0, wave[None].astype(np.complex128)))
 
 
 if __name__ == "__main__":

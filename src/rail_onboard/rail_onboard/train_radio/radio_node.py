@@ -98,7 +98,7 @@ class CbtcRadioNode(EquipmentNode[CbtcRadioParameters], name="cbtc_radio", names
         else:
             burst = self._slots.bursts([ordered.frames[0][1]])[0] * self._amplitude
             block = Waveform(stamp_ns, rate_hz, self._carriers_hz[channel], channel, burst)
-        self._send(block.to_cdr())
+        self._send(block)
 
     def _receive(self, stamp_ns: int, items: dict[str, Any]) -> None:
         """Report the frames of the train, and choose the base station by the beacons."""

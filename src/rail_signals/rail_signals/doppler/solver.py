@@ -31,7 +31,8 @@ from scipy.special import chdtri
 from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 
-from .shift_cost import ReceivedShift, ShiftCost, Symmetric, inverse
+from .shift_cost import ShiftCost
+from .shift_kernel import cost_profile, deepest_minima
 from .surveyed_line import SurveyedLine
 from .tone_plan import TonePlan
 
@@ -147,8 +148,11 @@ class DopplerSolver:
         self.grid_step_m = (line.end_m - line.start_m) / cells
         self._rates = line.rates(self.stations_m, self._grid_m).T.copy()  # [station, point]
         offsets = np.array([plan.slot_offset_hz(int(slot)) for slot in self.slots])
-        self._scale = (plan.carrier_hz + offsets) / plan.carrier_hz
-        self._per_mps = -(plan.carrier_hz + offsets) / SPEED_OF_LIGHT_M_PER_S
+        tones_hz = plan.carrier_hz + offsets
+        # Shift per speed and per offset at the carrier.
+        self._effects = np.stack(
+            [-tones_hz / SPEED_OF_LIGHT_M_PER_S, tones_hz / plan.carrier_hz], axis=1
+        )
         self._widest = Prior(0.0, 1e-6 * plan.max_offset_ppm * plan.carrier_hz or 1e-6)
         feet = np.argmin(np.abs(line.distances(self.stations_m, self._grid_m)), axis=0)
         #: Chainage beside which each station stands [m].
@@ -217,16 +221,11 @@ class DopplerSolver:
         if last - first < 3:
             return Answer(NoFixReason.OFF_TRACK)
         places_m = self._grid_m[first:last]
-        cost, v = measured.profile(self._rates[number, first:last])
-        if direction:
-            # The other way the cost is what standing still would cost, or more.
-            cost = np.where(v * direction < 0.0, measured.standing, cost)
-        minima = np.flatnonzero((cost[1:-1] <= cost[:-2]) & (cost[1:-1] < cost[2:])) + 1
+        standing, cost, v = measured.profile(self._rates, first, last, direction)
         ends = [i for i, j in ((0, 1), (-1, -2)) if cost[i] < cost[j]]
-        least = float(np.min(cost))
-        if measured.standing <= least + _MOVING_SIGMAS**2:
+        least, order = deepest_minima(cost, _MOST_CANDIDATES)
+        if standing <= least + _MOVING_SIGMAS**2:
             return Answer(NoFixReason.STANDSTILL)
-        order = minima[np.argsort(cost[minima])][:_MOST_CANDIDATES]
         solutions = measured.refine(places_m[order].tolist(), v[order].tolist(), (low_m, high_m))
         if direction:
             solutions = [f for f in solutions if f.speed_mps * direction > 0.0]
@@ -260,47 +259,27 @@ class _Measured:
         offset: Prior | None,
         speed: Prior | None,
     ) -> None:
-        self._z, self._w = z, weight
-        self._a, self._b = solver._per_mps[number], solver._scale[number]
+        self._number = number
         self._informed = (offset is not None) + (speed is not None)
-        self._offset = offset or solver._widest
-        self._speed = speed or Prior(0.0, 2.0 * solver.plan.max_speed_mps)
-        self._wo, self._wv = self._offset.sigma**-2, self._speed.sigma**-2
-        columns = (*solver.stations_m[number].T, z, weight, self._a, self._b)
+        offset = offset or solver._widest
+        speed = speed or Prior(0.0, 2.0 * solver.plan.max_speed_mps)
+        self._known = (speed.mean, speed.sigma**-2, offset.mean, offset.sigma**-2)
+        self._received = np.empty((len(number), 7))
+        self._received[:, :3] = solver.stations_m[number]
+        self._received[:, 3] = z
+        self._received[:, 4] = weight
+        self._received[:, 5:] = solver._effects[number]
         self.cost = ShiftCost(
-            solver.line,
-            [ReceivedShift(*row) for row in np.stack(columns, axis=1).tolist()],
-            solver.plan.averaging_time_s,
-            (self._speed.mean, self._wv),
-            (self._offset.mean, self._wo),
-        )
-        # The offset of a train that stands. What it leaves is small where the shifts are not,
-        # and so are the sums of what follows, which would otherwise cancel.
-        self._s22 = float(weight @ self._b**2) + self._wo
-        still_hz = (float(weight @ (self._b * z)) + self._wo * self._offset.mean) / self._s22
-        self._still = z - self._b * still_hz
-        self._still_prior = self._offset.mean - still_hz
-        #: Cost of a train that stands: the shifts are the offset's alone.
-        self.standing = (
-            float(weight @ self._still**2)
-            + self._wo * self._still_prior**2
-            + self._wv * self._speed.mean**2
+            solver.line, self._received, solver.plan.averaging_time_s, self._known
         )
 
-    def profile(self, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Least cost and best speed at places, from dR/ds [station, place]."""
-        a = self._a[:, None] * rates
-        # What the offset cannot take over of the effect of a speed.
-        fraction = ((self._w * self._b) @ a) / self._s22
-        a -= self._b[:, None] * fraction
-        weight = self._w @ (a * a) + self._wo * fraction**2 + self._wv
-        force = (
-            (self._w * self._still) @ a
-            - self._wo * self._still_prior * fraction
-            + self._wv * self._speed.mean
+    def profile(
+        self, rates: FloatArray, first: int, last: int, direction: int
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Cost of standing; least cost and best speed at places of the grid (`cost_profile`)."""
+        return cost_profile(
+            rates, self._number, first, last, self._received, self._known, direction
         )
-        v = force / weight
-        return self.standing - v * force, v
 
     def refine(
         self, places_m: list[float], speeds_mps: list[float], window_m: tuple[float, float]
@@ -309,17 +288,13 @@ class _Measured:
         solutions = []
         best = inf
         for s, v in zip(places_m, speeds_mps, strict=True):
-            here = self.cost.minimum(
-                (s, v, self._offset.mean), window_m, best + 2.0 * _CLEARLY_WORSE
-            )
+            here = self.cost.minimum((s, v, self._known[2]), window_m, best + 2.0 * _CLEARLY_WORSE)
             if here is not None:
                 solutions.append(here)
                 best = min(best, here.cost)
         solutions.sort(key=lambda minimum: minimum.cost)
-        freedom = self._z.size + self._informed - 3
-        return [
-            DopplerSolution(*m.at, _full(inverse(m.normal)), m.cost, freedom) for m in solutions
-        ]
+        freedom = len(self._number) + self._informed - 3
+        return [DopplerSolution(*m.at, m.covariance, m.cost, freedom) for m in solutions]
 
     def bent(self, fix: DopplerSolution) -> bool:
         """Whether the cost is no parabola within two sigma, so that the covariance misleads."""
@@ -327,10 +302,6 @@ class _Measured:
         s, v, delta = fix.chainage_m, fix.speed_mps, fix.offset_hz
         sides = (s + ds, v + dv, delta + dd), (s - ds, v - dv, delta - dd)
         return any(abs(self.cost(side) - fix.chi_square - 4.0) > _BENT for side in sides)
-
-
-def _full(c: Symmetric) -> FloatArray:
-    return np.array([[c[0], c[1], c[2]], [c[1], c[3], c[4]], [c[2], c[4], c[5]]])
 
 
 def speed_from_shift(

@@ -92,44 +92,9 @@ class SurveyedLine:
         return np.stack([p0, m0, 3 * (p1 - p0) - 2 * m0 - m1, 2 * (p0 - p1) + m0 + m1], axis=1)
 
     @cached_property
-    def _rows(self) -> list[list[float]]:
-        """The coefficients of a segment as plain floats."""
-        rows: list[list[float]] = self._cubics.reshape(-1, 12).tolist()
-        return rows
-
-    def frame(self, chainage_m: float) -> tuple[float, ...]:
-        """Place, first and second derivative by chainage at one point, nine plain floats.
-
-        For what asks for one point after the other; `at` takes many.
-        """
-        per_m = 1.0 / self.step_m
-        steps = (chainage_m - self.start_m) * per_m
-        index = min(max(int(steps), 0), len(self._rows) - 1)
-        t = steps - index
-        beyond = 0.0
-        if not 0.0 <= t <= 1.0:
-            beyond = t - min(max(t, 0.0), 1.0)
-            t -= beyond
-        x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = self._rows[index]
-        two, three, six = 2.0 * t, 3.0 * t * t, 6.0 * t
-        tx, ty, tz = (
-            x1 + two * x2 + three * x3,
-            y1 + two * y2 + three * y3,
-            z1 + two * z2 + three * z3,
-        )
-        square = t * t
-        cube = square * t
-        x = x0 + t * x1 + square * x2 + cube * x3 + beyond * tx
-        y = y0 + t * y1 + square * y2 + cube * y3 + beyond * ty
-        z = z0 + t * z1 + square * z2 + cube * z3 + beyond * tz
-        if beyond:
-            return (x, y, z, tx * per_m, ty * per_m, tz * per_m, 0.0, 0.0, 0.0)
-        bend = per_m * per_m
-        return (
-            *(x, y, z, tx * per_m, ty * per_m, tz * per_m),
-            *((2.0 * x2 + six * x3) * bend, (2.0 * y2 + six * y3) * bend),
-            (2.0 * z2 + six * z3) * bend,
-        )
+    def cubics(self) -> FloatArray:
+        """The cubics of each segment flat: [segment, 12] [m]."""
+        return np.ascontiguousarray(self._cubics.reshape(-1, 12))
 
     def at(self, chainage_m: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Places and their first and second derivatives by chainage [..., 3].

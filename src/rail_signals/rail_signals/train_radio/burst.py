@@ -20,13 +20,21 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import upfirdn
 
-from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
+from rail_signals.compiled import compiled
 
-from .pilot_estimation import PilotPattern, wiener_estimator
+from .pilot_estimation import wiener_estimator
+from .pilot_pattern import PilotPattern
+from .pulse import matched_filter, root_raised_cosine, shape_pulses
 from .space_time_block import Scheme
 from .symbol_mapping import BitArray, Constellation
+
+_LARGEST = 1e100
+"""Samples beyond it would overflow when squared."""
+
+_LEAST_NOISE = 1e-9
+"""Least fraction of the power that counts as noise, so that no SNR is infinite."""
 
 
 def noise_variance(
@@ -65,40 +73,6 @@ def noise_variance(
         raise ValueError(f"pilot_share must lie from 0 to below 1, got {pilot_fraction!r}")
     energy_per_bit = channel_power / (bits_per_symbol * (1 - pilot_fraction))
     return float(energy_per_bit / 10 ** (eb_n0_db / 10))
-
-
-def root_raised_cosine(rolloff: float, samples_per_symbol: int, span_symbols: int) -> FloatArray:
-    """Root-raised-cosine pulse of unit energy, cut off at `span_symbols` to either side.
-
-    Returns
-    -------
-    float64 [2 span_symbols samples_per_symbol + 1]
-
-    Examples
-    --------
-    >>> pulse = root_raised_cosine(0.35, 4, 6)
-    >>> len(pulse), round(float(pulse @ pulse), 12)
-    (49, 1.0)
-    """
-    if not 0 < rolloff <= 1:
-        raise ValueError(f"rolloff must lie above 0 and up to 1, got {rolloff!r}")
-    if samples_per_symbol < 2:
-        raise ValueError(f"samples_per_symbol must be 2 or more, got {samples_per_symbol!r}")
-    if span_symbols < 1:
-        raise ValueError(f"span_symbols must be 1 or more, got {span_symbols!r}")
-    half_span = span_symbols * samples_per_symbol
-    t = np.arange(-half_span, half_span + 1) / samples_per_symbol
-    # The closed form is 0 / 0 at the middle and at a quarter of 1 / rolloff: limits there.
-    pole = np.abs(np.abs(4 * rolloff * t) - 1) < 1e-9
-    safe = np.where(pole | (t == 0), 0.123, t)
-    pulse = np.sin(math.pi * safe * (1 - rolloff))
-    pulse += 4 * rolloff * safe * np.cos(math.pi * safe * (1 + rolloff))
-    pulse /= math.pi * safe * (1 - (4 * rolloff * safe) ** 2)
-    pulse[t == 0] = 1 + rolloff * (4 / math.pi - 1)
-    corner = math.pi / (4 * rolloff)
-    edge = (1 + 2 / math.pi) * math.sin(corner) + (1 - 2 / math.pi) * math.cos(corner)
-    pulse[pole] = rolloff / math.sqrt(2) * edge
-    return np.asarray(pulse / math.sqrt(pulse @ pulse))
 
 
 @dataclass(frozen=True)
@@ -207,22 +181,35 @@ class RadioBurstFormat:
         if values.ndim == 0 or values.shape[-1] != self.data_bits:
             raise ValueError(f"bits must be [..., {self.data_bits}], got shape {values.shape}")
         room = self.pattern.data_symbols * self.constellation.bits_per_symbol
-        fill = np.zeros((*values.shape[:-1], room - self.data_bits), dtype=values.dtype)
-        symbols = self.constellation.modulate(np.concatenate([values, fill], axis=-1))
+        if room > self.data_bits:
+            fill = np.zeros((*values.shape[:-1], room - self.data_bits), dtype=values.dtype)
+            values = np.concatenate([values, fill], axis=-1)
+        symbols = self.constellation.modulate(values)
         burst = self.pattern.insert(self.scheme.encode(symbols))
-        wave = np.zeros((*burst.shape[:-1], self.samples), dtype=np.complex128)
-        if wave.size:
-            shaped = upfirdn(self.pulse, burst, up=self.samples_per_symbol, axis=-1)
-            wave[..., : shaped.shape[-1]] = shaped
+        wave = np.empty((*burst.shape[:-1], self.samples), dtype=np.complex128)
+        shape_pulses(_parts(burst), self.pulse, self._rows(wave))
         return wave
 
     def symbols_of(self, samples: ComplexArray) -> ComplexArray:
-        """Matched filter, sampled at the symbols: complex128 [..., rx, symbols]."""
-        if not samples.size:
-            return np.zeros((*samples.shape[:-1], self.pattern.symbols), dtype=np.complex128)
-        filtered = upfirdn(self.pulse, samples, down=self.samples_per_symbol, axis=-1)
-        first = 2 * self.span_symbols
-        return np.asarray(filtered[..., first : first + self.pattern.symbols])
+        """Matched filter, sampled at the symbols.
+
+        Parameters
+        ----------
+        samples : complex [..., samples]
+
+        Returns
+        -------
+        complex128 [..., symbols]
+        """
+        x = np.ascontiguousarray(samples, dtype=np.complex128)
+        symbols = np.empty((*x.shape[:-1], self.pattern.symbols), dtype=np.complex128)
+        matched_filter(self._rows(x), self.pulse, _parts(symbols))
+        return symbols
+
+    def _rows(self, waves: ComplexArray) -> FloatArray:
+        """Parts of waves, a row per symbol time: a view [wave, row, samples_per_symbol, 2]."""
+        rows = self.pattern.symbols + 2 * self.span_symbols
+        return _parts(waves).reshape(-1, rows, self.samples_per_symbol, 2)
 
 
 @dataclass(frozen=True)
@@ -306,10 +293,9 @@ class RadioBurstReceiver:
             raise ValueError(
                 f"samples must be [..., {plan.receive}, {burst.samples}], got shape {x.shape}"
             )
-        size = np.abs(x)
-        # A comparison with NaN is false.
-        sound = np.asarray((size < _LARGEST).all(axis=(-2, -1)) & (size > 0).any(axis=(-2, -1)))
-        y = burst.symbols_of(np.where(sound[..., None, None], x, 0))
+        x = np.ascontiguousarray(x)
+        sound = self._sound(x)
+        y = burst.symbols_of(x if sound.all() else np.where(sound[..., None, None], x, 0))
         pilots = y[..., pattern.pilot_positions]
         if channel is None:
             estimator = wiener_estimator(pattern, doppler_hz / burst.symbol_rate_hz)
@@ -317,8 +303,7 @@ class RadioBurstReceiver:
             detected = sound & (level.evidence >= self._least_evidence)
             h = estimator.estimate(pilots, level.snr)
             noise = level.noise_variance
-            error = estimator.error_variance(level.snr)[..., pattern.data_positions]
-            excess = 1 + level.snr[..., None] * error.mean(axis=-2)
+            excess = 1 + level.snr[..., None] * estimator.mean_error(level)
         else:
             h = np.asarray(channel, dtype=np.complex128)
             shape = (plan.receive, plan.transmit, pattern.symbols)
@@ -328,25 +313,51 @@ class RadioBurstReceiver:
             sent = np.sum(h[..., pattern.pilot_positions] * pattern.pilots, axis=-2)
             noise = np.mean(np.abs(pilots - sent) ** 2, axis=(-2, -1))
             detected = sound
-            excess = np.ones((*x.shape[:-2], 1))
+            excess = np.ones((*x.shape[:-2], pattern.symbols))
+        # Pilots too: blocks of the code stand in one piece, and all of them are cheaper than some.
+        symbols, gain = plan.combine(y, h)
+        parts = _whole(y)
+        power = 2 * np.mean(parts * parts, axis=-1).reshape(noise.shape)
+        floor = np.maximum(noise, _LEAST_NOISE * power)
+        snr = np.zeros_like(gain)
+        np.divide(gain, floor[..., None] * excess, out=snr, where=detected[..., None])
         data = pattern.data_positions
-        symbols, gain = plan.combine(y[..., data], h[..., data])
-        floor = np.maximum(noise, _LEAST_NOISE * np.mean(np.abs(y) ** 2, axis=(-2, -1)))
-        snr = np.divide(
-            gain, floor[..., None] * excess, out=np.zeros_like(gain), where=detected[..., None]
-        )
-        bits = burst.constellation.decide(symbols)[..., : burst.data_bits]
+        bits = burst.constellation.decide(symbols[..., data])[..., : burst.data_bits]
+        if not detected.all():
+            bits = bits * detected[..., None]
+            h = h * detected[..., None, None, None]
         return ReceivedBurst(
-            bits=np.asarray(bits * detected[..., None], dtype=np.uint8),
-            snr=snr,
-            channel=h * detected[..., None, None, None],
+            bits=np.asarray(bits, dtype=np.uint8),
+            snr=snr[..., data],
+            channel=h,
             noise_variance=noise,
             detected=np.asarray(detected),
         )
 
+    def _sound(self, samples: ComplexArray) -> BoolArray:
+        """Which bursts can be worked with: finite, and not zero altogether; bool [...]."""
+        sound = np.empty(samples.shape[:-2], dtype=np.bool_)
+        _check_samples(_whole(samples), sound.reshape(-1))
+        return sound
 
-_LARGEST = 1e100
-"""Samples beyond it would overflow when squared."""
 
-_LEAST_NOISE = 1e-9
-"""Least fraction of the power that counts as noise, so that no SNR is infinite."""
+@compiled
+def _check_samples(parts: FloatArray, sound: BoolArray) -> None:
+    """Whether bursts [burst, parts of samples] are below the largest and not all zero."""
+    for burst in range(len(parts)):
+        fit, some = 0, 0
+        for value in parts[burst]:
+            # A comparison with NaN is false.
+            fit += abs(value) < _LARGEST
+            some += value != 0.0
+        sound[burst] = fit == parts.shape[1] and some > 0
+
+
+def _whole(values: ComplexArray) -> FloatArray:
+    """Parts of each burst [..., rx, n]: a view [burst, 2 rx n]."""
+    return values.view(np.float64).reshape(-1, 2 * values.shape[-2] * values.shape[-1])
+
+
+def _parts(values: ComplexArray) -> FloatArray:
+    """Real and imaginary parts alternating: a view [rows, 2 columns]."""
+    return values.view(np.float64).reshape(-1, 2 * values.shape[-1])

@@ -28,7 +28,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rail_signals.arrays import ComplexArray
+from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.phasors import cis
 
@@ -175,19 +175,17 @@ class MimoFading:
         shape = (self.receive, self.transmit, *place.shape)
         return np.ascontiguousarray(np.moveaxis(field.reshape(shape), (0, 1), (-3, -2)))
 
-    def at_few(self, distance_m: ArrayLike) -> ComplexArray:
-        """As `at`, wave by wave: quicker for places [n] far apart.
-
-        Less than a turn is left of each phase, so that single precision is good to 1e-6 of a
-        wave (-120 dB).
+    @property
+    def waves(self) -> tuple[FloatArray, ComplexArray]:
+        """The waves themselves, for sums wave by wave at places far apart.
 
         Returns
         -------
-        complex128 [rx, tx, n]
+        turns_per_m : float64 [rx, tx, wave]
+            Turns of each wave along a metre of track.
+        start : complex128 [rx, tx, wave]
+            Each wave at the distance 0.
         """
-        cells = np.asarray(distance_m) * (_CELLS_PER_WAVELENGTH / self.wavelength_m)
-        turns = cells[:, None] * self._turns[:, None, :]
-        turns -= np.rint(turns)
-        angle = (2.0 * math.pi * turns).astype(np.float32)
-        field = (self._terms[0][:, None, :] * cis(angle)).sum(axis=-1)
-        return np.asarray(field.reshape(self.receive, self.transmit, -1))
+        shape = (self.receive, self.transmit, -1)
+        turns_per_m = self._turns * (_CELLS_PER_WAVELENGTH / self.wavelength_m)
+        return turns_per_m.reshape(shape), self._terms[0].reshape(shape)

@@ -22,7 +22,11 @@ from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 
 
 def path_loss_db(
-    distance_m: ArrayLike, carrier_hz: float, *, exponent: float = 2.0, reference_m: float = 10.0
+    distance_m: ArrayLike,
+    carrier_hz: ArrayLike,
+    *,
+    exponent: float = 2.0,
+    reference_m: float = 10.0,
 ) -> FloatArray:
     """Log-distance path loss.
 
@@ -30,8 +34,8 @@ def path_loss_db(
     ----------
     distance_m : [...]
         Length of the path [m]; up to `reference_m` the loss is that of free space.
-    carrier_hz
-        Carrier frequency [Hz].
+    carrier_hz : [...]
+        Carrier frequency [Hz]; broadcasts against the distances.
     exponent
         Exponent n of power over distance beyond the reference; 2 is free space.
     reference_m
@@ -52,17 +56,16 @@ def path_loss_db(
     >>> path_loss_db([10.0, 1000.0], 2.4e9, exponent=3.0).round(2).tolist()
     [60.05, 120.05]
     """
-    for name, value in (
-        ("carrier_hz", carrier_hz),
-        ("exponent", exponent),
-        ("reference_m", reference_m),
-    ):
+    for name, value in (("exponent", exponent), ("reference_m", reference_m)):
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} must be finite and above zero, got {value!r}")
+    carrier = np.asarray(carrier_hz, dtype=np.float64)
+    if not (np.isfinite(carrier) & (carrier > 0)).all():
+        raise ValueError(f"carrier_hz must be finite and above zero, got {carrier_hz!r}")
     distance = np.asarray(distance_m, dtype=np.float64)
     if not (np.isfinite(distance) & (distance >= 0)).all():
         raise ValueError(f"distance_m must be finite and not negative, got {distance_m!r}")
-    turn = 4 * math.pi * carrier_hz / SPEED_OF_LIGHT_M_PER_S
+    turn = 4 * math.pi * carrier / SPEED_OF_LIGHT_M_PER_S
     near = np.clip(distance, 1 / turn, reference_m)
     beyond = np.maximum(distance / reference_m, 1.0)
     loss = 20 * np.log10(turn * near) + 10 * exponent * np.log10(beyond)

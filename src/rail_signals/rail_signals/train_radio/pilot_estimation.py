@@ -29,6 +29,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import j0
 
 from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.compiled import compiled
+
+from .pilot_pattern import PilotPattern
 
 MAX_SNR = 1e6
 """Ceiling of the estimated SNR (60 dB)."""
@@ -36,98 +39,6 @@ MAX_SNR = 1e6
 _LEVELS = 10.0 ** (np.arange(-20, 61) / 10)
 _LEAST_DOPPLER = 1e-6
 _BINS_PER_OCTAVE = 4
-
-
-@dataclass(frozen=True)
-class PilotPattern:
-    """Where the pilots of a burst stand, and what they are.
-
-    A block of pilots begins every `period` symbols; the last block follows the last data. To
-    follow a channel of Doppler f_D, `period` must stay well below ``1 / (2 f_D T)`` symbols: at
-    half of it the error already doubles, near it neither channel nor level can be told.
-
-    Parameters
-    ----------
-    data_symbols
-        Data symbols n of a burst; even with two antennas.
-    transmit
-        Transmit antennas, 1 or 2.
-    period
-        Symbols from the start of one block to the next; even.
-    block
-        Symbols in a block; even, below `period`, so that no pair of data is parted.
-
-    Examples
-    --------
-    >>> pattern = PilotPattern(data_symbols=6, transmit=2, period=6)
-    >>> pattern.symbols, pattern.pilot_positions.tolist(), pattern.data_positions.tolist()
-    (12, [0, 1, 6, 7, 10, 11], [2, 3, 4, 5, 8, 9])
-    """
-
-    data_symbols: int
-    transmit: int = 2
-    period: int = 16
-    block: int = 2
-
-    def __post_init__(self) -> None:
-        """Validate every field."""
-        if self.transmit not in (1, 2):
-            raise ValueError(f"transmit must be 1 or 2 antennas, got {self.transmit!r}")
-        if self.data_symbols < 1 or self.data_symbols % self.transmit:
-            raise ValueError(
-                f"data_symbols must be whole blocks of {self.transmit}, got {self.data_symbols!r}"
-            )
-        if self.block < 2 or self.block % 2:
-            raise ValueError(f"block must be even and positive, got {self.block!r}")
-        if self.period <= self.block or self.period % 2:
-            raise ValueError(f"period must be even and above {self.block}, got {self.period!r}")
-
-    @property
-    def symbols(self) -> int:
-        """Symbols of the burst, pilots and data."""
-        return self.data_symbols + (self._stretches + 1) * self.block
-
-    @property
-    def pilot_fraction(self) -> float:
-        """Fraction of the energy of a burst that the pilots take."""
-        return 1 - self.data_symbols / self.symbols
-
-    @cached_property
-    def data_positions(self) -> NDArray[np.intp]:
-        """Places of the data, intp [data_symbols]."""
-        place = np.arange(self.data_symbols)
-        return np.asarray(place + (place // (self.period - self.block) + 1) * self.block)
-
-    @cached_property
-    def pilot_positions(self) -> NDArray[np.intp]:
-        """Places of the pilots, intp [pilots]."""
-        free = np.ones(self.symbols, dtype=np.bool_)
-        free[self.data_positions] = False
-        return np.flatnonzero(free)
-
-    @cached_property
-    def pilots(self) -> FloatArray:
-        """Pilots of each antenna, float64 [tx, pilots], of total power 1."""
-        count = len(self.pilot_positions)
-        rows = np.ones((self.transmit, count))
-        rows[1:, 1::2] = -1
-        return rows / math.sqrt(self.transmit)
-
-    def insert(self, data: ArrayLike) -> ComplexArray:
-        """Burst complex128 [..., tx, symbols] of data complex [..., tx, n]."""
-        x = np.asarray(data, dtype=np.complex128)
-        if x.ndim < 2 or x.shape[-2:] != (self.transmit, self.data_symbols):
-            raise ValueError(
-                f"data must be [..., {self.transmit}, {self.data_symbols}], got shape {x.shape}"
-            )
-        burst = np.empty((*x.shape[:-1], self.symbols), dtype=np.complex128)
-        burst[..., self.pilot_positions] = self.pilots
-        burst[..., self.data_positions] = x
-        return burst
-
-    @property
-    def _stretches(self) -> int:
-        return -(-self.data_symbols // (self.period - self.block))
 
 
 @dataclass(frozen=True)
@@ -143,11 +54,14 @@ class PilotLevel:
     evidence : float64 [...]
         Log-likelihood ratio of a channel in noise against noise alone. Noise exceeds a value t
         with a probability below ``exp(-t)`` (measured: a fifth of it at most).
+    step : intp [...]
+        Place of `snr` on its grid.
     """
 
     snr: FloatArray
     noise_variance: FloatArray
     evidence: FloatArray
+    step: NDArray[np.intp]
 
 
 class WienerEstimator:
@@ -182,34 +96,30 @@ class WienerEstimator:
         between = correlation[np.abs(at[:, None] - at)] * (pilots.T @ pilots)
         values, vectors = np.linalg.eigh(between)
         self._values = np.maximum(values, 0.0)
-        self._vectors = vectors
+        self._vectors = np.ascontiguousarray(vectors)
         ahead = correlation[np.abs(np.arange(count)[:, None] - at)] * pilots[:, None, :]
         # [tx symbols, pilots]: covariance of the channel with the pilots' eigenvectors.
-        self._map = ahead.reshape(-1, len(at)) @ vectors
-        self._map_squared = self._map**2
-        self._shrink = 1 / (_LEVELS[:, None] * self._values + 1)
-        self._penalty = -np.sum(np.log(self._shrink), axis=1)
+        covariance = ahead.reshape(-1, len(at)) @ vectors
+        self._covariance_squared = covariance**2
+        # Rows for the kernel, of outputs that lie side by side; zeros make up whole fours.
+        self._rows = np.zeros((-(-len(at) // 4) * 4, len(covariance)))
+        self._rows[: len(at)] = covariance.T
+        shrink = 1 / (_LEVELS[:, None] * self._values + 1)
+        self._penalty = -np.sum(np.log(shrink), axis=1)
+        self._shrink = np.ascontiguousarray(shrink.T)
 
     def level(self, received: ArrayLike) -> PilotLevel:
         """Level of bursts from their pilots complex [..., rx, pilots].
 
         Channel power and noise are taken as common to the receive antennas.
         """
-        v = self._eigen(self._check(received))
-        energy = np.sum(v.real**2 + v.imag**2, axis=-2)
-        antennas, count = v.shape[-2:]
-        variance = np.matmul(self._shrink, energy[..., None])[..., 0] / (antennas * count)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            cost = antennas * (count * np.log(variance) + self._penalty)
-            alone = antennas * count * np.log(energy.mean(axis=-1) / antennas)
-        best = np.argmin(cost, axis=-1)[..., None]
-        evidence = np.zeros(best.shape[:-1])
-        some = energy.sum(axis=-1) > 0
-        np.subtract(
-            alone, np.take_along_axis(cost, best, axis=-1)[..., 0], out=evidence, where=some
-        )
-        noise = np.take_along_axis(variance, best, axis=-1)[..., 0]
-        return PilotLevel(np.asarray(_LEVELS[best[..., 0]]), noise, np.maximum(evidence, 0.0))
+        y = self._check(received)
+        found = np.empty((2, *y.shape[:-2]))
+        step = np.empty(y.shape[:-2], dtype=np.intp)
+        pilots = y.view(np.float64).reshape(-1, y.shape[-2], 2 * y.shape[-1])
+        tables = self._vectors, self._shrink, self._penalty
+        _levels(pilots, *tables, step.reshape(-1), found.reshape(2, -1))
+        return PilotLevel(np.asarray(_LEVELS[step]), found[0], found[1], step)
 
     def estimate(self, received: ArrayLike, snr: ArrayLike) -> ComplexArray:
         """Channel at every symbol of the burst.
@@ -226,12 +136,27 @@ class WienerEstimator:
         complex128 [..., rx, tx, symbols]
         """
         y = self._check(received)
-        weight = self._weight(snr)
-        z = np.ascontiguousarray(self._eigen(y) * weight[..., None, :])
-        # Burst by burst and in real arithmetic: independent of how many there are.
-        parts = np.matmul(self._map, z.view(np.float64).reshape(*z.shape, 2))
-        shape = (*z.shape[:-1], self.pattern.transmit, self.pattern.symbols)
-        return np.asarray(np.ascontiguousarray(parts).view(np.complex128).reshape(shape))
+        receive, count = y.shape[-2:]
+        lead = y.shape[:-2]
+        weight = np.ascontiguousarray(np.broadcast_to(self._weight(snr), (*lead, count)))
+        out = np.empty((*lead, receive, self.pattern.transmit, self.pattern.symbols), np.complex128)
+        _channels(
+            y.view(np.float64).reshape(-1, receive, 2 * count),
+            weight.reshape(-1, count),
+            self._vectors,
+            self._rows,
+            out.view(np.float64).reshape(-1, receive, 2 * self._rows.shape[1]),
+        )
+        return out
+
+    def mean_error(self, level: PilotLevel) -> FloatArray:
+        """Mean over transmit antennas of `error_variance` at a level, float64 [..., symbols]."""
+        return np.asarray(self._mean_errors[level.step])
+
+    @cached_property
+    def _mean_errors(self) -> FloatArray:
+        """Of every level on the grid, float64 [levels, symbols]."""
+        return np.asarray(self.error_variance(_LEVELS).mean(axis=-2))
 
     def error_variance(self, snr: ArrayLike) -> FloatArray:
         """Predicted error variance of `estimate` as a fraction of the channel power.
@@ -248,7 +173,7 @@ class WienerEstimator:
         float64 [..., tx, symbols]
         """
         weight = self._weight(snr)
-        explained = np.matmul(self._map_squared, weight[..., None])[..., 0]
+        explained = np.matmul(self._covariance_squared, weight[..., None])[..., 0]
         shape = (*weight.shape[:-1], self.pattern.transmit, self.pattern.symbols)
         return np.asarray(np.maximum(1 - explained.reshape(shape), 0.0), dtype=np.float64)
 
@@ -258,18 +183,123 @@ class WienerEstimator:
             raise ValueError(f"snr must be finite and not negative, got {snr!r}")
         return np.asarray(level / (level * self._values + 1))
 
-    def _eigen(self, received: ComplexArray) -> ComplexArray:
-        """Pilots along the eigenvectors, complex128 [..., rx, pilots]."""
-        y = np.ascontiguousarray(received)
-        parts = np.matmul(self._vectors.T, y.view(np.float64).reshape(*y.shape, 2))
-        return np.asarray(np.ascontiguousarray(parts).view(np.complex128)[..., 0])
-
     def _check(self, received: ArrayLike) -> ComplexArray:
-        y = np.asarray(received, dtype=np.complex128)
+        y = np.ascontiguousarray(received, dtype=np.complex128)
         count = len(self.pattern.pilot_positions)
         if y.ndim < 2 or y.shape[-2] < 1 or y.shape[-1] != count:
             raise ValueError(f"received must be [..., rx, {count}], got shape {y.shape}")
         return y
+
+
+@compiled
+def _along(pilots: FloatArray, vectors: FloatArray, out: FloatArray) -> None:
+    """Pilots [2 pilots], parts alternating, along the eigenvectors, [part, eigenvector]."""
+    out[:] = 0.0
+    for p in range(len(vectors)):
+        real, imag = pilots[2 * p], pilots[2 * p + 1]
+        for k in range(len(vectors)):
+            out[0, k] += vectors[p, k] * real
+            out[1, k] += vectors[p, k] * imag
+
+
+@compiled
+def _levels(
+    pilots: FloatArray,
+    vectors: FloatArray,
+    shrink: FloatArray,
+    penalty: FloatArray,
+    step: NDArray[np.intp],
+    found: FloatArray,
+) -> None:
+    """Maximum likelihood level of bursts.
+
+    Parameters
+    ----------
+    pilots : float64 [burst, rx, 2 pilots]
+        Parts alternating.
+    vectors : float64 [pilot, eigenvector]
+    shrink : float64 [eigenvector, level]
+    penalty : float64 [level]
+    step : intp [burst]
+        The level found; result.
+    found : float64 [2, burst]
+        Noise variance and evidence; result.
+    """
+    bursts, antennas, _ = pilots.shape
+    count, levels = shrink.shape
+    z = np.empty((2, count))
+    energy, variance = np.empty(count), np.empty(levels)
+    for burst in range(bursts):
+        energy[:] = 0.0
+        for antenna in range(antennas):
+            _along(pilots[burst, antenna], vectors, z)
+            for k in range(count):
+                energy[k] += z[0, k] ** 2 + z[1, k] ** 2
+        variance[:] = 0.0
+        total = 0.0
+        for k in range(count):
+            total += energy[k]
+            for i in range(levels):
+                variance[i] += shrink[k, i] * energy[k]
+        step[burst] = 0
+        found[:, burst] = 0.0
+        if total == 0.0:
+            continue
+        of = antennas * count
+        least = np.inf
+        for i in range(levels):
+            cost = of * math.log(variance[i] / of) + antennas * penalty[i]
+            if cost < least:
+                least = cost
+                step[burst] = i
+        found[0, burst] = variance[step[burst]] / of
+        found[1, burst] = max(of * math.log(total / of) - least, 0.0)
+
+
+@compiled
+def _channels(
+    pilots: FloatArray,
+    weight: FloatArray,
+    vectors: FloatArray,
+    rows: FloatArray,
+    channel: FloatArray,
+) -> None:
+    """Channel of bursts by Wiener interpolation.
+
+    Parameters
+    ----------
+    pilots : float64 [burst, rx, 2 pilots]
+        Parts alternating.
+    weight : float64 [burst, eigenvector]
+    vectors : float64 [pilot, eigenvector]
+    rows : float64 [eigenvector, tx symbols]
+        Covariance of the channel with the eigenvectors, filled up to whole fours by zeros.
+    channel : float64 [burst, rx, 2 tx symbols]
+        Parts alternating; result.
+    """
+    bursts, antennas, _ = pilots.shape
+    fours, places = rows.shape
+    parts, sums = np.zeros((2 * antennas, fours)), np.empty((2 * antennas, places))
+    z = np.empty((2, len(vectors)))
+    for burst in range(bursts):
+        for antenna in range(antennas):
+            _along(pilots[burst, antenna], vectors, z)
+            for k in range(len(vectors)):
+                parts[2 * antenna, k] = z[0, k] * weight[burst, k]
+                parts[2 * antenna + 1, k] = z[1, k] * weight[burst, k]
+        sums[:] = 0.0
+        # Four rows at a time for all antennas: the table is larger than the first-level cache.
+        for k in range(0, fours, 4):
+            row0, row1, row2, row3 = rows[k], rows[k + 1], rows[k + 2], rows[k + 3]
+            for c in range(2 * antennas):
+                part, total = parts[c, k : k + 4], sums[c]
+                z0, z1, z2, z3 = part[0], part[1], part[2], part[3]
+                for i in range(places):
+                    total[i] += row0[i] * z0 + row1[i] * z1 + row2[i] * z2 + row3[i] * z3
+        for antenna in range(antennas):
+            for i in range(places):
+                channel[burst, antenna, 2 * i] = sums[2 * antenna, i]
+                channel[burst, antenna, 2 * i + 1] = sums[2 * antenna + 1, i]
 
 
 def wiener_estimator(pattern: PilotPattern, doppler_per_symbol: float) -> WienerEstimator:

@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -90,12 +91,9 @@ class Scheme:
         if self.transmit == 1:
             return np.array(x[..., None, :])
         sent = np.empty((*x.shape[:-1], 2, x.shape[-1]), dtype=np.complex128)
-        first, second = x[..., 0::2], x[..., 1::2]
-        sent[..., 0, 0::2] = first
-        sent[..., 0, 1::2] = -second.conj()
-        sent[..., 1, 0::2] = second
-        sent[..., 1, 1::2] = first.conj()
-        sent *= math.sqrt(self.antenna_power)
+        _encoded(
+            np.ascontiguousarray(x).reshape(-1, x.shape[-1]), sent.reshape(-1, *sent.shape[-2:])
+        )
         return sent
 
     def combine(self, received: ArrayLike, channel: ArrayLike) -> tuple[ComplexArray, FloatArray]:
@@ -122,7 +120,7 @@ class Scheme:
             ``sum |h|^2 / tx`` over the branches of a symbol: noise of variance N0 per receive
             antenna becomes ``N0 / gain`` in `symbols`.
         """
-        y = np.asarray(received, dtype=np.complex128)
+        y = np.ascontiguousarray(received, dtype=np.complex128)
         h = np.asarray(channel, dtype=np.complex128)
         self._check_length("received", y.shape)
         n = y.shape[-1]
@@ -132,17 +130,19 @@ class Scheme:
             raise ValueError(
                 f"channel must be [..., {self.receive}, {self.transmit}, {n}], got shape {h.shape}"
             )
-        power = h.real**2 + h.imag**2
-        if self.transmit == 1:
-            matched = np.sum(h[..., 0, :].conj() * y, axis=-2)
-            gain = np.sum(power[..., 0, :], axis=-2)
-        else:
-            matched, gain = _alamouti(y, h, power)
-        matched = matched * math.sqrt(self.antenna_power)
-        gain = gain * self.antenna_power
-        gain = np.broadcast_to(gain, matched.shape).copy()
-        known = gain > 0
-        symbols = np.divide(matched, gain, out=np.zeros_like(matched), where=known)
+        lead = y.shape[:-2]
+        if h.shape[:-3] != lead:
+            lead = np.broadcast_shapes(lead, h.shape[:-3])
+            y = np.broadcast_to(y, (*lead, *y.shape[-2:]))
+            h = np.broadcast_to(h, (*lead, *h.shape[-3:]))
+        symbols = np.empty((*lead, n), dtype=np.complex128)
+        gain = np.empty((*lead, n))
+        _combined(
+            np.ascontiguousarray(y).reshape(-1, self.receive, n),
+            np.ascontiguousarray(h).reshape(-1, self.receive, self.transmit, n),
+            symbols.reshape(-1, n),
+            gain.reshape(-1, n),
+        )
         return symbols, gain
 
     def _check_length(self, name: str, shape: tuple[int, ...]) -> None:
@@ -153,19 +153,59 @@ class Scheme:
             )
 
 
-def _alamouti(
-    y: ComplexArray, h: ComplexArray, power: FloatArray
-) -> tuple[ComplexArray, FloatArray]:
-    """Sums of eq. 8 [..., n] and the weights they carry, before the fraction of power."""
-    y1, y2 = y[..., 0::2], y[..., 1::2].conj()
-    early, late = h[..., 0::2], h[..., 1::2]
-    x1 = np.sum(early[..., 0, :].conj() * y1 + late[..., 1, :] * y2, axis=-2)
-    x2 = np.sum(early[..., 1, :].conj() * y1 - late[..., 0, :] * y2, axis=-2)
-    matched = np.stack([x1, x2], axis=-1).reshape(*x1.shape[:-1], 2 * x1.shape[-1])
-    early_power, late_power = power[..., 0::2], power[..., 1::2]
-    g1 = np.sum(early_power[..., 0, :] + late_power[..., 1, :], axis=-2)
-    g2 = np.sum(early_power[..., 1, :] + late_power[..., 0, :], axis=-2)
-    return matched, np.stack([g1, g2], axis=-1).reshape(*g1.shape[:-1], 2 * g1.shape[-1])
+@compiled
+def _encoded(x: ComplexArray, sent: ComplexArray) -> None:
+    """Code of eq. 1: symbols complex128 [burst, n] to the antennas' [burst, 2, n], the result."""
+    amplitude = math.sqrt(0.5)
+    for burst in range(len(x)):
+        first, second = sent[burst]
+        for i in range(0, x.shape[1], 2):
+            a, b = x[burst, i] * amplitude, x[burst, i + 1] * amplitude
+            first[i], first[i + 1] = a, -b.conjugate()
+            second[i], second[i + 1] = b, a.conjugate()
+
+
+@compiled
+def _combined(y: ComplexArray, h: ComplexArray, symbols: ComplexArray, gain: FloatArray) -> None:
+    """Sums of eq. 8 over the weights they carry.
+
+    Parameters
+    ----------
+    y : complex128 [burst, rx, n]
+    h : complex128 [burst, rx, tx, n]
+    symbols : complex128 [burst, n]
+        Result.
+    gain : float64 [burst, n]
+        Result.
+    """
+    bursts, receive, transmit, count = h.shape
+    amplitude, power = math.sqrt(1.0 / transmit), 1.0 / transmit
+    symbols[:] = 0.0
+    gain[:] = 0.0
+    for burst in range(bursts):
+        x, g = symbols[burst], gain[burst]
+        for r in range(receive):
+            z, h1, h2 = y[burst, r], h[burst, r, 0], h[burst, r, transmit - 1]
+            if transmit == 1:
+                for i in range(count):
+                    x[i] += h1[i].conjugate() * z[i]
+                    g[i] += _power(h1[i])
+            else:
+                for i in range(0, count, 2):
+                    early, late = z[i], z[i + 1].conjugate()
+                    x[i] += h1[i].conjugate() * early + h2[i + 1] * late
+                    x[i + 1] += h2[i].conjugate() * early - h1[i + 1] * late
+                    g[i] += _power(h1[i]) + _power(h2[i + 1])
+                    g[i + 1] += _power(h2[i]) + _power(h1[i + 1])
+        for i in range(count):
+            g[i] *= power
+            scale = amplitude / g[i] if g[i] > 0.0 else 0.0
+            x[i] = complex(x[i].real * scale, x[i].imag * scale)
+
+
+@compiled
+def _power(gain: complex) -> float:
+    return gain.real**2 + gain.imag**2
 
 
 _SCHEMES: Final = {

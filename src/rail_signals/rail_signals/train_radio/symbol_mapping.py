@@ -81,11 +81,15 @@ class Constellation:
                 f"bits must have whole symbols of {self.bits_per_symbol} on their last axis,"
                 f" got shape {values.shape}"
             )
-        if values.dtype != np.bool_ and not ((values == 0) | (values == 1)).all():
+        if values.dtype == np.uint8:
+            sound = not values.size or values.max() <= 1
+        else:
+            sound = values.dtype == np.bool_ or bool(((values == 0) | (values == 1)).all())
+        if not sound:
             wrong = values[(values != 0) & (values != 1)]
             raise ValueError(f"bits must be 0 or 1, got {wrong.flat[0]!r}")
         count = values.shape[-1] // self.bits_per_symbol
-        groups = values.astype(np.intp).reshape(*values.shape[:-1], count, self.bits_per_symbol)
+        groups = values.astype(np.uint8).reshape(*values.shape[:-1], count, self.bits_per_symbol)
         labels = groups[..., 0]
         for i in range(1, self.bits_per_symbol):
             labels = 2 * labels + groups[..., i]
@@ -107,13 +111,14 @@ class Constellation:
         z = np.asarray(symbols, dtype=np.complex128)
         if z.ndim == 0:
             raise ValueError(f"symbols must have an axis, got shape {z.shape}")
-        out = np.empty((*z.shape, self.bits_per_symbol), dtype=np.uint8)
-        axes = [z.real] if self.bits_per_symbol == 1 else [z.real, z.imag]
-        for i, part in enumerate(axes):
-            out[..., i] = part < 0
-            if self.bits_per_symbol == 4:
-                out[..., i + 2] = np.abs(part) > 2 / math.sqrt(10)
-        return out.reshape(*z.shape[:-1], z.shape[-1] * self.bits_per_symbol)
+        width = self.bits_per_symbol
+        # [..., axis], the axes that carry bits.
+        parts = np.ascontiguousarray(z).view(np.float64).reshape(*z.shape, 2)[..., : min(width, 2)]
+        out = np.empty((*z.shape, width), dtype=np.bool_)
+        np.less(parts, 0, out=out[..., :2])
+        if width == 4:
+            np.greater(np.abs(parts), 2 / math.sqrt(10), out=out[..., 2:])
+        return out.view(np.uint8).reshape(*z.shape[:-1], z.shape[-1] * width)
 
     def _axis(self, bits: NDArray[np.int_]) -> FloatArray:
         """Coordinate [points] of the bits [points, 0, 1 or 2] of one axis."""

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from rail_msgs_py.decoders import bare_stamp
 from rail_msgs_py.doppler import quantities
 from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
 from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.quantities import TICK
-from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import REFERENCE_TX
 from rail_msgs_py.topics.tick import CLOCK
@@ -52,10 +52,9 @@ class ReferenceStationNode(
         self._tone = RepeatedBlock(Waveform(0, *radio, samples[None, :]))
         self._silence = RepeatedBlock(silence(0, *radio))
         self._send = self.stream_out(REFERENCE_TX, station=self.place)
-        self.stream_in(CLOCK, self._on_clock)
+        self.blocks_in(CLOCK, bare_stamp, self._on_clock)
 
-    def _on_clock(self, raw: bytes) -> None:
-        stamp_ns = clock_from_cdr(raw)
+    def _on_clock(self, stamp_ns: int, _: None) -> None:
         self._send((self._tone if self.switched_on else self._silence).at(stamp_ns))
         message = "sends its tone" if self.switched_on else "switched off"
         self.report(DiagnosticStatus.OK, "tone", message, stamp_ns=stamp_ns)

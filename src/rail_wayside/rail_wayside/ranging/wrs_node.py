@@ -5,22 +5,23 @@ Topics, for each of its zones: in ``/clock``, ``<zone>/rx``; out ``<zone>/tx``, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from rail_msgs_py.decoders import bare_stamp, samples
+from rail_msgs_py.delivery import Send
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.ranging import quantities
 from rail_msgs_py.ranging.range_reading import RangeWriter
 from rail_msgs_py.ranging.signal_parameters import SignalParameters, signal_of
-from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.ranging import RANGE, WRS_RX, WRS_TX
 from rail_msgs_py.topics.tick import CLOCK
-from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence, silent_stamp_ns
+from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
+from rail_signals.arrays import ComplexArray
 from rail_signals.ranging.signal import modulate
 
 from .ranging_station import NO_SIGNAL, RangingStation
@@ -46,8 +47,8 @@ class _Antenna:
 
     tone: RepeatedBlock
     quiet: RepeatedBlock
-    send: Callable[[bytes], None]
-    publish: Callable[[bytes], None]
+    send: Send
+    publish: Send
     writer: RangeWriter
     uplink_channel: int
     disturbance: str = ""
@@ -55,6 +56,16 @@ class _Antenna:
 
 class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
     """Wayside station as a managed node."""
+
+    @cached_property
+    def place(self) -> str:
+        """Site: a station is named after it."""
+        return str(self.get_name())
+
+    @cached_property
+    def listed_name(self) -> str:
+        """Full name under which the table of topics has this station."""
+        return f"{self.default_namespace}/{self.place}"
 
     def setup(self) -> None:
         """Make the tone, and open the ports of the antenna into every zone."""
@@ -68,16 +79,16 @@ class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
             noise_mw=10.0 ** (p.noise_dbm / 10.0),
         )
         tone = modulate(signal, np.zeros(len(signal.tones_hz)))
-        samples = tone[None, :] * 10.0 ** (p.power_dbm / 20.0)
+        sent = tone[None, :] * 10.0 ** (p.power_dbm / 20.0)
         low_m, high_m = self._station.interval_m
-        site = self.get_name()
+        site = self.place
         self._antennas: list[_Antenna] = []
         for zone, channel, uplink_channel, carrier_hz in zip(
             p.zones, p.downlink_channels, p.uplink_channels, p.downlink_carriers_hz, strict=True
         ):
             radio = (signal.sample_rate_hz, carrier_hz, channel)
             antenna = _Antenna(
-                RepeatedBlock(Waveform(0, *radio, samples)),
+                RepeatedBlock(Waveform(0, *radio, sent)),
                 RepeatedBlock(silence(0, *radio)),
                 self.stream_out(WRS_TX, site=site, zone=zone),
                 self.stream_out(RANGE, site=site, zone=zone),
@@ -85,8 +96,9 @@ class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
                 uplink_channel,
             )
             self._antennas.append(antenna)
-            self.stream_in(WRS_RX, partial(self._on_block, zone, antenna), site=site, zone=zone)
-        self.stream_in(CLOCK, self._on_clock)
+            receive = partial(self._on_block, zone, antenna)
+            self.blocks_in(WRS_RX, samples, receive, site=site, zone=zone)
+        self.blocks_in(CLOCK, bare_stamp, self._on_clock)
 
     def _check_parameters(self) -> None:
         p = self._p
@@ -100,20 +112,17 @@ class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
         if p.comparator not in ("and", "quadrature", "two_tone"):
             raise ParameterError(f"comparator: {p.comparator}: and, quadrature or two_tone")
 
-    def _on_clock(self, raw: bytes) -> None:
-        stamp_ns = clock_from_cdr(raw)
+    def _on_clock(self, stamp_ns: int, _: None) -> None:
         for antenna in self._antennas:
             block = antenna.tone if self.switched_on else antenna.quiet
             antenna.send(block.at(stamp_ns))
 
-    def _on_block(self, zone: str, antenna: _Antenna, raw: bytes) -> None:
-        stamp_ns = silent_stamp_ns(raw)
-        if stamp_ns is not None:
-            reading = NO_SIGNAL
-        else:
-            block = Waveform.from_cdr(raw)
-            stamp_ns = block.stamp_ns
-            reading = self._station.read(block.samples[0]) if self.switched_on else NO_SIGNAL
+    def _on_block(
+        self, zone: str, antenna: _Antenna, stamp_ns: int, received: ComplexArray | None
+    ) -> None:
+        reading = NO_SIGNAL
+        if received is not None and self.switched_on:
+            reading = self._station.read(received[0])
         antenna.publish(antenna.writer.write(stamp_ns, reading.range_m, reading.variance_m2))
         if reading.disturbance != antenna.disturbance:
             antenna.disturbance = reading.disturbance

@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py.decoders import table_row
+from rail_msgs_py.decoders import block, table_row
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.quantities import GIVE_UP, TICK
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.track_code import CIRCUIT_RX, CIRCUIT_TX, CODE_SENT, OCCUPANCY
 from rail_msgs_py.track_code import quantities
-from rail_msgs_py.waveform import Waveform, silence, silent_stamp_ns
+from rail_msgs_py.waveform import Waveform, silence
 from rail_signals.ranging.band_level import band_levels_db
 from rail_signals.track_code.profile import load_profile, profile_names
 from rail_signals.track_code.signal import FmTransmitter
@@ -77,7 +77,7 @@ class TrackCodeTransmitterNode(
             self.inputs.port(OCCUPANCY, table_row(OCCUPANCY), delay_ns=tick_ns, circuit=ahead)
             for ahead in p.ahead
         ]
-        self.stream_in(CIRCUIT_RX, self._on_block, circuit=circuit)
+        self.blocks_in(CIRCUIT_RX, block, self._on_block, circuit=circuit)
         self.inputs.clock()
 
     def start_over(self) -> None:
@@ -99,27 +99,22 @@ class TrackCodeTransmitterNode(
         """Send the code for what is ahead."""
         rate_hz = self._p.sample_rate_hz
         if not self.switched_on:
-            self._send(silence(stamp_ns, rate_hz, 0.0, 0).to_cdr())
+            self._send(silence(stamp_ns, rate_hz, 0.0, 0))
             self._report_code(stamp_ns, np.full((1, 5), np.nan))
             return
         rows = [items.get(port) for port in self._ahead]
         fields = self._logic.fields([None if row is None else bool(row[0]) for row in rows])
         bits = encode(self._profile, fields)
         samples = self._transmitter.block(bits, self._samples)
-        self._send(
-            Waveform(stamp_ns, rate_hz, 0.0, 0, samples[None].astype(np.complex128)).to_cdr()
-        )
+        self._send(Waveform(stamp_ns, rate_hz, 0.0, 0, samples[None].astype(np.complex128)))
         values = [float(as_number(bits)), *(fields[name] for name in CODE_SENT.columns[1:])]
         self._report_code(stamp_ns, np.array([values], dtype=np.float64))
 
-    def _on_block(self, raw: bytes) -> None:
-        stamp_ns = silent_stamp_ns(raw)
+    def _on_block(self, stamp_ns: int, received: Waveform | None) -> None:
         level_db = -math.inf
-        if stamp_ns is None:
-            block = Waveform.from_cdr(raw)
-            stamp_ns = block.stamp_ns
+        if received is not None:
             (level_db,) = band_levels_db(
-                block.row.real, (self._p.carrier_hz,), self._p.sample_rate_hz
+                received.row.real, (self._p.carrier_hz,), self._p.sample_rate_hz
             )
         occupied = not level_db > self._p.clear_level_db - OCCUPIED_BELOW_DB
         self._sense(stamp_ns, np.array([[float(occupied), max(level_db, -300.0)]]))

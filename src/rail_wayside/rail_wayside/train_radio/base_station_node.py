@@ -17,7 +17,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py.decoders import stamped
+from rail_msgs_py.decoders import samples, stamped
 from rail_msgs_py.parameters import parameter
 from rail_msgs_py.quantities import GIVE_UP, TICK
 from rail_msgs_py.stamps import NANOSECONDS
@@ -33,7 +33,8 @@ from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.parameters import TrainRadioParameters, slots_of
 from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
-from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence, silent_stamp_ns
+from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
+from rail_signals.arrays import ComplexArray
 from rail_signals.train_radio.burst import RadioBurstReceiver
 from rail_signals.train_radio.slots import BEACON_SLOT, frame_of
 
@@ -82,7 +83,7 @@ class CbtcBaseStationNode(
             delay_ns=round(p.tick_s * NANOSECONDS),
             base=base,
         )
-        self.stream_in(CBTC_BASE_RX, self._on_block, base=base)
+        self.blocks_in(CBTC_BASE_RX, samples, self._on_block, base=base)
         self.inputs.clock()
 
     def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
@@ -95,18 +96,16 @@ class CbtcBaseStationNode(
         first, end = self._slots.span(BEACON_SLOT)
         block[:, first:end] = self._beacon
         block *= self._amplitude
-        self._send(Waveform(stamp_ns, *self._radio, block).to_cdr())
+        self._send(Waveform(stamp_ns, *self._radio, block))
 
-    def _on_block(self, raw: bytes) -> None:
-        stamp_ns = silent_stamp_ns(raw)
-        if stamp_ns is not None:
+    def _on_block(self, stamp_ns: int, received: ComplexArray | None) -> None:
+        if received is None:
             self._report_frames(telegrams(stamp_ns))
             return
-        block = Waveform.from_cdr(raw)
         frames: list[tuple[int, bytes]] = []
         if self.switched_on:
             # Where a scheme sends by two antennas and receives by one, that is the first.
-            cut = self._slots.cut(block.samples[: self._slots.burst.scheme.receive])
+            cut = self._slots.cut(received[: self._slots.burst.scheme.receive])
             used = [slot for slot in range(1, len(cut)) if cut[slot, 0, 0] or cut[slot].any()]
             bursts = self._receiver.receive(cut[used], doppler_hz=self._p.doppler_hz)
             frames = [
@@ -114,8 +113,8 @@ class CbtcBaseStationNode(
                 for slot, bits, detected in zip(used, bursts.bits, bursts.detected, strict=True)
                 if detected
             ]
-        self._report_frames(telegrams(block.stamp_ns, frames))
-        self.report(DiagnosticStatus.OK, "radio", "hears trains", stamp_ns=block.stamp_ns)
+        self._report_frames(telegrams(stamp_ns, frames))
+        self.report(DiagnosticStatus.OK, "radio", "hears trains", stamp_ns=stamp_ns)
 
 
 if __name__ == "__main__":

@@ -30,13 +30,13 @@ from numpy.typing import NDArray
 from rail_msgs_py.topics.world import STATE
 from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.delay import fractional_delay
-from rail_signals.phasors import cis
+from rail_signals.delay import delayed
 from rail_world.line.network import Network
 from rail_world.ranging.medium import THERMAL_NOISE_DBM_PER_HZ
 from rail_world.ranging.noise import NoiseSource
 
 from .description import ReferenceDescription
+from .path_kernel import add_tones, distances
 
 _STAGE = 21  # of the noise; the ranging radio has 1 and 2, the train radio 11 and 12
 _OFFSET_STREAM = 22
@@ -45,9 +45,10 @@ _LEAST_M = 1.0
 
 @dataclass(frozen=True)
 class _TransmittedTone:
-    """A block that a station sends, and the mean frequency of its envelope [Hz]."""
+    """A block that a station sends, its transform and the mean frequency of its envelope [Hz]."""
 
     samples: ComplexArray
+    spectrum: ComplexArray
     mean_hz: float
 
 
@@ -69,6 +70,7 @@ class ReferenceMedium:
         self.description = description
         self._tracks = [network.tracks[name] for name in description.tracks]
         self._stations_m = np.array([s.position_m for s in description.stations])
+        self._index = {station.name: row for row, station in enumerate(description.stations)}
         samples, rate_hz = description.samples, description.sample_rate_hz
         self._time_s = (np.arange(samples) - 0.5 * (samples - 1)) / rate_hz
         self._frequencies_hz = np.fft.fftfreq(samples, 1.0 / rate_hz)
@@ -111,74 +113,80 @@ class ReferenceMedium:
             If a block has not the length of the description.
         """
         shift_hz = self._station_hz.copy()
-        dead = set()
-        names = {station.name: index for index, station in enumerate(self.description.stations)}
+        sends = np.zeros(len(shift_hz), dtype=np.bool_)
+        sends[list(sent)] = True
         for fault in self.description.faults:
             if fault.acts(time_s):
                 if fault.shift_hz is None:  # a dead station
-                    dead.add(names[fault.station])
+                    sends[self._index[fault.station]] = False
                 else:
-                    shift_hz[names[fault.station]] += fault.shift_hz
-        on_line = np.flatnonzero(state[:, STATE.index["on_line"]] > 0.0).tolist()
-        received: dict[int, NDArray[np.complex64]] = {}
-        for train in on_line:
-            here = state[train, 1:4]
-            away_m = np.sqrt(((self._stations_m - here) ** 2).sum(axis=1))
-            near = np.flatnonzero(away_m <= self.description.coverage_range_m).tolist()
-            near = [station for station in near if station in sent and station not in dead]
-            if not near:
-                continue
-            distance_m = self._distances(state[train], near)
-            total = self._noise.blocks(_STAGE, [train], tick)[0]
-            total *= np.float32(np.sqrt(self.noise_mw))
-            for row, station in enumerate(near):
-                offset_hz = shift_hz[station] - self.receiver_hz[train]
-                total += self._arrived(sent[station], station, distance_m[row], offset_hz)
-            received[train] = total
-        return received
+                    shift_hz[self._index[fault.station]] += fault.shift_hz
+        line = state[:, None, 1:4] - self._stations_m
+        away_m = np.sqrt(np.einsum("tsk,tsk->ts", line, line))
+        on_line = state[:, STATE.index["on_line"]] > 0.0
+        near = (away_m <= self.description.coverage_range_m) & sends & on_line[:, None]
+        train, station = np.nonzero(near)
+        if not train.size:
+            return {}
+        trains, row = np.unique(train, return_inverse=True)
+        power_mw = np.full(len(trains), self.noise_mw)
+        heard = self._noise.blocks(_STAGE, trains.tolist(), tick, power_mw)
+        distance_m = np.empty((len(train), self.description.samples))
+        ways = self._ways(state[trains])[row]
+        distances(ways, self._stations_m[station], self._time_s, _LEAST_M, distance_m)
+        offset_hz = shift_hz[station] - self.receiver_hz[train]
+        self._add(sent, station, row, offset_hz, distance_m, heard)
+        return dict(zip(trains.tolist(), heard, strict=True))
 
     def snr(self, distance_m: FloatArray, power_mw: float) -> FloatArray:
         """Signal-to-noise ratio per sample of a station at a distance, linear."""
-        return np.asarray(power_mw * 10.0 ** (self._gain_db(distance_m) / 10.0) / self.noise_mw)
+        return np.asarray(power_mw * self._amplitude(distance_m) ** 2 / self.noise_mw)
 
-    def _gain_db(self, distance_m: FloatArray) -> FloatArray:
+    def _amplitude(self, distance_m: FloatArray) -> FloatArray:
+        """Gain of an amplitude at a distance."""
         near = np.maximum(distance_m, _LEAST_M)
-        exponent = self.description.path_loss_exponent
-        return np.asarray(-self._at_1m_db - 10.0 * exponent * np.log10(near))
+        exponent = 0.5 * self.description.path_loss_exponent
+        return np.asarray(10.0 ** (self._at_1m_db / -20.0) * near**-exponent)
 
-    def _distances(self, row: FloatArray, stations: list[int]) -> FloatArray:
-        """Distance from each station at each sample [station, sample]."""
-        t = self._time_s
-        path_m = (
-            row[STATE.index["speed_mps"]] * t + 0.5 * row[STATE.index["acceleration_mps2"]] * t * t
-        )
-        track = self._tracks[int(row[STATE.index["track_index"]])]
-        chainage_m = min(max(row[STATE.index["chainage_m"]], 0.0), track.length_m)
-        bend_m = 0.5 * float(track.curvature_per_m(chainage_m)) * path_m * path_m
-        heading = row[STATE.index["heading_rad"]]
-        cos, sin = np.cos(heading), np.sin(heading)
-        place = row[1:4][:, None] + np.stack(
-            (
-                cos * path_m - sin * bend_m,
-                sin * path_m + cos * bend_m,
-                1e-3 * float(track.gradient_permil(chainage_m)) * path_m,
-            )
-        )
-        line = place[None] - self._stations_m[stations][:, :, None]
-        return np.asarray(np.maximum(np.sqrt(np.einsum("skn,skn->sn", line, line)), _LEAST_M))
+    def _ways(self, state: FloatArray) -> FloatArray:
+        """Ways [train, 8] as of `path_kernel.distances`."""
+        columns = ("x_m", "y_m", "z_m", "heading_rad", "speed_mps", "acceleration_mps2")
+        ways = np.zeros((len(state), 8))
+        ways[:, :6] = state[:, [STATE.index[column] for column in columns]]
+        on, chainage_m = state[:, STATE.index["track_index"]], state[:, STATE.index["chainage_m"]]
+        for index in set(on.tolist()):
+            track, rows = self._tracks[int(index)], on == index
+            at_m = np.minimum(np.maximum(chainage_m[rows], 0.0), track.length_m)
+            ways[rows, 6] = track.curvature_per_m(at_m)
+            ways[rows, 7] = 1e-3 * track.gradient_permil(at_m)
+        return ways
 
-    def _arrived(
-        self, samples: ComplexArray, station: int, distance_m: FloatArray, offset_hz: float
-    ) -> ComplexArray:
-        sent = self._sent(station, samples)
-        middle_m = float(distance_m[len(distance_m) // 2])
-        delay_s = middle_m / SPEED_OF_LIGHT_M_PER_S
-        delayed = fractional_delay(sent.samples, delay_s, self.description.sample_rate_hz)
-        turns = offset_hz * self._time_s
-        turns -= self.description.carrier_hz / SPEED_OF_LIGHT_M_PER_S * distance_m
-        turns -= sent.mean_hz / SPEED_OF_LIGHT_M_PER_S * (distance_m - middle_m)
-        amplitude = 10.0 ** (self._gain_db(distance_m) / 20.0)
-        return np.asarray(delayed * amplitude * cis(2.0 * np.pi * np.mod(turns, 1.0)))
+    def _add(
+        self,
+        sent: Mapping[int, ComplexArray],
+        station: NDArray[np.intp],
+        row: NDArray[np.intp],
+        offset_hz: FloatArray,
+        distance_m: FloatArray,
+        heard: NDArray[np.complex64],
+    ) -> None:
+        """Add what arrives over links [link] to the rows of ``heard`` [row, sample]."""
+        tones = [self._sent(index, sent[index]) for index in station.tolist()]
+        middle_m = distance_m[:, self.description.samples // 2]
+        envelope = delayed(
+            np.array([tone.spectrum for tone in tones]),
+            middle_m / SPEED_OF_LIGHT_M_PER_S,
+            self.description.sample_rate_hz,
+        )
+        turns = np.empty((len(tones), 3))
+        turns[:, 0] = offset_hz
+        turns[:, 1] = self.description.carrier_hz / SPEED_OF_LIGHT_M_PER_S
+        turns[:, 2] = [tone.mean_hz / SPEED_OF_LIGHT_M_PER_S for tone in tones]
+        add_tones(
+            *(row, turns, self._time_s, distance_m, self._amplitude(distance_m)),
+            envelope.view(np.float64),
+            heard.view(np.float32),
+        )
 
     def _sent(self, station: int, samples: ComplexArray) -> _TransmittedTone:
         known = self._known.get(station)
@@ -187,8 +195,9 @@ class ReferenceMedium:
                 raise ValueError(
                     f"a block of {samples.shape}, not of {self.description.samples} samples"
                 )
-            power = np.abs(np.fft.fft(samples)) ** 2
+            spectrum = np.fft.fft(samples)
+            power = np.abs(spectrum) ** 2
             total = float(power.sum())
             mean_hz = float(power @ self._frequencies_hz) / total if total else 0.0
-            known = self._known[station] = _TransmittedTone(samples, mean_hz)
+            known = self._known[station] = _TransmittedTone(samples, spectrum, mean_hz)
         return known

@@ -37,7 +37,7 @@ class ReferenceMediumNode(
         self._tick_ns = self._world.tick_ns
         self._medium = ReferenceMedium(plan, self._world.network(), self._world.seed)
         self._ports = [
-            self.inputs.port(REFERENCE_TX, BlockReader().read, station=station.name)
+            self.inputs.port(REFERENCE_TX, BlockReader().decoder(), station=station.name)
             for station in plan.stations
         ]
         self._state = self.state_port(self.inputs, len(plan.trains))
@@ -58,7 +58,7 @@ class ReferenceMediumNode(
         for train, publish in enumerate(self._out):
             if train in received:
                 samples = received[train][None, :].astype(np.complex128)
-                publish(Waveform(stamp_ns, *self._radio, samples).to_cdr())
+                publish(Waveform(stamp_ns, *self._radio, samples))
             else:
                 publish(self._silence.at(stamp_ns))
 

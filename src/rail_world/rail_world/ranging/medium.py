@@ -10,7 +10,6 @@ station antenna a link does not exist, in either direction.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,11 +17,11 @@ from numpy.typing import NDArray
 
 from rail_signals.arrays import ComplexArray, FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
-from rail_signals.delay import repetition, through_paths
-from rail_signals.phasors import cis
+from rail_signals.delay import repetition
 
 from .description import AntennaPattern, RadioDescription
 from .noise import NoiseSource
+from .path_kernels import add_links, carry, links_in_coverage
 
 THERMAL_NOISE_DBM_PER_HZ = -173.975  # k T at 290 K
 _MIN_DISTANCE_M = 1.0
@@ -43,7 +42,10 @@ class TrainAntennas:
 
 @dataclass(frozen=True)
 class Paths:
-    """Geometry of one tick between all station and train antennas, arrays [station, train]."""
+    """Geometry of one tick between all station and train antennas, arrays [station, train].
+
+    Out of coverage the gain is -inf, the closing speed 0. ``links`` counts those in coverage.
+    """
 
     distance_m: FloatArray
     closing_speed_mps: FloatArray
@@ -51,6 +53,7 @@ class Paths:
     in_coverage: NDArray[np.bool_]
     train_position_m: FloatArray
     train_axis: FloatArray
+    links: int
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,14 @@ class RadioMedium:
         self._positions_m = np.array([a.position_m for a in stations]).reshape(-1, 3)
         boresight = np.array([a.boresight for a in stations]).reshape(-1, 3)
         self._boresight = boresight / np.linalg.norm(boresight, axis=1, keepdims=True)
-        self._coverage_range_m = np.array([a.coverage_range_m for a in stations])
+        coverage_range_m = np.array([a.coverage_range_m for a in stations])
+        self._antennas = np.column_stack((self._positions_m, self._boresight, coverage_range_m))
+        ours, theirs = description.station_pattern, description.train_pattern
+        self._patterns = (
+            ours.gain_dbi + theirs.gain_dbi,
+            *(ours.beamwidth_deg, ours.front_to_back_db),
+            *(theirs.beamwidth_deg, theirs.front_to_back_db),
+        )
         self._downlink = np.array([a.downlink_channel for a in stations], dtype=np.int64)
         self._uplink = np.array([a.uplink_channel for a in stations], dtype=np.int64)
         self._sites = [a.site for a in stations]
@@ -131,32 +141,30 @@ class RadioMedium:
 
     def paths(self, trains: TrainAntennas) -> Paths:
         """Distances, closing speeds and antenna gains of one tick."""
-        line = trains.position_m[None, :, :] - self._positions_m[:, None, :]
-        distance_m = np.maximum(np.sqrt(np.einsum("stk,stk->st", line, line)), _MIN_DISTANCE_M)
-        unit = line / distance_m[..., None]
-        station_cos = np.einsum("stk,sk->st", unit, self._boresight)
         # The train's antenna looks back to the station of its zone.
         heading = trains.heading_rad
         axis = -np.stack((np.cos(heading), np.sin(heading), np.zeros_like(heading)), axis=1)
-        train_cos = -np.einsum("stk,tk->st", unit, axis)
-        radio = self.description
-        gain_db = (
-            pattern_gain_db(radio.station_pattern, station_cos)
-            + pattern_gain_db(radio.train_pattern, train_cos)
-            - 10.0 * radio.path_loss_exponent * np.log10(distance_m)
+        shape = (len(self._sites), len(heading))
+        links, in_coverage = np.empty((3, *shape)), np.empty(shape, dtype=np.bool_)
+        count = links_in_coverage(
+            self._antennas,
+            np.concatenate((trains.position_m, axis, trains.velocity_mps), axis=1),
+            self._patterns,
+            *(self.description.path_loss_exponent, _MIN_DISTANCE_M),
+            *(links, in_coverage),
         )
-        closing = -np.einsum("stk,tk->st", unit, trains.velocity_mps)
-        in_coverage = distance_m <= self._coverage_range_m[:, None]
-        return Paths(distance_m, closing, gain_db, in_coverage, trains.position_m, axis)
+        distance_m, closing_mps, gain_db = links
+        return Paths(distance_m, closing_mps, gain_db, in_coverage, trains.position_m, axis, count)
 
     def dead_stations(self, time_s: float) -> set[int]:
         """Indices of station antennas that are dead at ``time_s``."""
-        dead = {
-            fault.station
+        return {
+            index
             for fault in self.description.faults
             if fault.kind == "dead_station" and fault.from_s <= time_s < fault.to_s
+            for index, site in enumerate(self._sites)
+            if site == fault.station
         }
-        return {index for index, site in enumerate(self._sites) if site in dead}
 
     def downlink(
         self, tick: int, time_s: float, paths: Paths, blocks: dict[int, ComplexArray]
@@ -176,10 +184,7 @@ class RadioMedium:
         -------
         dict of (train index, channel) -> Reception; pairs that hear nothing are missing.
         """
-        sending = self._alive(time_s)
-        sending[[station for station in range(len(sending)) if station not in blocks]] = False
-        links = np.nonzero(paths.in_coverage & sending[:, None])
-        return self._receive(tick, time_s, paths, links, blocks, self._downlink[links[0]])
+        return self._receive(tick, time_s, paths, blocks, self._downlink)
 
     def uplink(
         self,
@@ -196,10 +201,8 @@ class RadioMedium:
         channel = np.zeros(paths.in_coverage.shape[1], dtype=np.int64)
         for train, (on, _) in blocks.items():
             channel[train] = on
-        hears = (self._uplink[:, None] == channel) & self._alive(time_s)[:, None]
-        links = np.nonzero(paths.in_coverage & hears)
         sent = {train: samples for train, (_, samples) in blocks.items()}
-        return self._receive(tick, time_s, paths, links, sent, self._uplink[links[0]], uplink=True)
+        return self._receive(tick, time_s, paths, sent, channel, uplink=True)
 
     def _alive(self, time_s: float) -> NDArray[np.bool_]:
         """Which station antennas are not dead."""
@@ -212,58 +215,65 @@ class RadioMedium:
         tick: int,
         time_s: float,
         paths: Paths,
-        links: tuple[NDArray[np.intp], ...],
         blocks: dict[int, ComplexArray],
         channel: NDArray[np.int64],
         *,
         uplink: bool = False,
     ) -> dict[tuple[int, int], Reception]:
-        """Carry ``blocks`` over the links (station, train), each on its channel; add noise."""
-        received: dict[tuple[int, int], Reception] = {}
-        if not blocks or not links[0].size:
-            return received
+        """Carry ``blocks`` of senders, each on its ``channel`` [sender], and add noise."""
+        # Of a long line all stations send, and few have a train in reach.
+        reach = np.flatnonzero(paths.in_coverage.any(axis=0 if uplink else 1)).tolist()
+        senders = [sender for sender in reach if sender in blocks]
+        if not senders:
+            return {}
         radio = self.description
-        sent_by = links[1 if uplink else 0].tolist()
-        sent = [self._sent(uplink, sender, blocks[sender]) for sender in sent_by]
-        gain_db = paths.gain_db[links] - self._loss_at_1m_db[channel]
-        power_mw = np.array([block.power_mw for block in sent]) * 10.0 ** (gain_db / 10.0)
-        audible = np.flatnonzero(power_mw >= self._floor_mw)
-        if not audible.size:
-            return received
-        s, t = links[0][audible], links[1][audible]
-        power_mw, channel = power_mw[audible], channel[audible]
-        carrier_hz = self._carrier_hz[channel]
-        delay_s = paths.distance_m[s, t] / SPEED_OF_LIGHT_M_PER_S
-        doppler_hz = carrier_hz * paths.closing_speed_mps[s, t] / SPEED_OF_LIGHT_M_PER_S
-        offsets = self._station_offset[s] - self._train_offset[t]
-        carrier_phase = -2.0 * np.pi * np.mod(carrier_hz * delay_s, 1.0)
-        arrived = through_paths(
-            _stacked([sent[link].spectrum for link in audible.tolist()]),
-            radio.samples,
-            delay_s=delay_s,
-            shift_hz=doppler_hz + carrier_hz * (-offsets if uplink else offsets),
-            gain=10.0 ** (gain_db[audible] / 20.0) * cis(carrier_phase),
-            sample_rate_hz=radio.sample_rate_hz,
+        sent = [self._sent(uplink, sender, blocks[sender]) for sender in senders]
+        row_of = np.full(len(channel), -1)
+        row_of[senders] = range(len(sent))
+        spectra, periods = _side_by_side([block.spectrum for block in sent])
+        table = np.empty((paths.links, 5), dtype=np.int64)
+        values = np.empty((paths.links, 2))
+        arrived = np.empty((paths.links, spectra.shape[1]), dtype=np.complex128)
+        count, _ = carry(
+            uplink,
+            (row_of, channel, periods, np.array([block.power_mw for block in sent]), spectra),
+            (
+                self._uplink if uplink else self._downlink,
+                *(self._alive(time_s), self._station_offset),
+            ),
+            self._train_offset,
+            (self._carrier_hz, self._loss_at_1m_db),
+            (paths.in_coverage, paths.distance_m, paths.closing_speed_mps, paths.gain_db),
+            (self._floor_mw, SPEED_OF_LIGHT_M_PER_S, radio.sample_rate_hz),
+            (table, values, arrived),
         )
-        arriving: dict[tuple[int, int], list[int]] = {}
-        receivers = (s if uplink else t).tolist()
-        for row, port in enumerate(zip(receivers, channel.tolist(), strict=True)):
-            arriving.setdefault(port, []).append(row)
-        ports = [port[0] * 128 + port[1] for port in arriving]
-        noise = self._noise.blocks(2 if uplink else 1, ports, tick)
-        for (port, rows), total in zip(arriving.items(), noise, strict=True):
-            noise_mw = self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink)
-            total *= np.float32(np.sqrt(noise_mw))
-            for row in rows:
-                total += arrived[row]
-            strongest = max(rows, key=lambda row: float(power_mw[row]))
-            received[port] = Reception(
-                total,
-                float(power_mw[strongest]),
-                noise_mw,
-                (int(s[strongest]), int(t[strongest])),
-            )
-        return received
+        if not count:
+            return {}
+        table, values, arrived = table[:count], values[:count], arrived[:count]
+        # In double precision, where a row does not depend on the others that are transformed.
+        for period in set(periods.tolist()):
+            rows = table[:, 3] == period
+            arrived[rows, :period] = np.fft.ifft(arrived[rows, :period])
+        # Of each port the strongest link, in the order of the ports.
+        links = table[table[:, 4] == 1]
+        power_mw = values[table[:, 4] == 1, 0].tolist()
+        order = np.argsort(links[:, 0]).tolist()
+        sources = links[:, 1:3].tolist()
+        numbers = self._uplink if uplink else self._downlink
+        ports = [
+            (source[0 if uplink else 1], int(numbers[source[0]]))
+            for source in (sources[link] for link in order)
+        ]
+        noise_mw = [
+            self.noise_mw + self._jamming_mw(time_s, port, paths, uplink=uplink) for port in ports
+        ]
+        places = [port[0] * 128 + port[1] for port in ports]
+        heard = self._noise.blocks(2 if uplink else 1, places, tick, np.array(noise_mw))
+        add_links(table, values, arrived.view(np.float64), heard.view(np.float32))
+        return {
+            port: Reception(samples, power_mw[link], noise, (sources[link][0], sources[link][1]))
+            for port, samples, noise, link in zip(ports, heard, noise_mw, order, strict=True)
+        }
 
     def _sent(self, uplink: bool, sender: int, samples: ComplexArray) -> _TransmittedBlock:
         """Power and spectrum of a block; a block that is sent again is not transformed again."""
@@ -307,14 +317,10 @@ class RadioMedium:
         return total
 
 
-def _stacked(spectra: list[ComplexArray]) -> ComplexArray:
-    """Transforms [path, period] of a common period: a shorter one leaves bins empty."""
-    periods = {len(spectrum) for spectrum in spectra}
-    if len(periods) == 1:
-        return np.array(spectra)
-    period = math.lcm(*periods)
-    stacked = np.zeros((len(spectra), period), dtype=np.complex128)
-    for row, spectrum in zip(stacked, spectra, strict=True):
-        repeats = period // len(spectrum)
-        row[::repeats] = spectrum * repeats
-    return stacked
+def _side_by_side(spectra: list[ComplexArray]) -> tuple[ComplexArray, NDArray[np.int64]]:
+    """Transforms [sender, longest period] of one period each, and the periods [sender]."""
+    periods = np.array([len(spectrum) for spectrum in spectra])
+    rows = np.empty((len(spectra), int(periods.max())), dtype=np.complex128)
+    for row, spectrum in zip(rows, spectra, strict=True):
+        row[: len(spectrum)] = spectrum
+    return rows, periods

@@ -13,7 +13,7 @@ import numpy as np
 
 from rail_msgs_py.tick_inputs import TickInputs
 from rail_msgs_py.topics.ranging import LINKS, VRS_RX, VRS_TX, WRS_RX, WRS_TX
-from rail_msgs_py.waveform import BlockReader, RepeatedBlock, Waveform, silence
+from rail_msgs_py.waveform import BlockReader, RepeatedBlock, Waveform, WaveformView, silence
 from rail_world.medium_node import MediumNode, MediumParameters
 
 from .description import RadioDescription
@@ -39,15 +39,17 @@ class RadioMediumNode(MediumNode[RadioMediumParameters], name="radio_medium", na
         downlink = TickInputs(self, self._on_downlink, self._p.timeout_s, then=self.inputs)
         self._state = self.state_port(downlink, len(radio.trains))
         self._station_ports = [
-            downlink.port(WRS_TX, BlockReader().read, site=antenna.site, zone=antenna.zone)
+            downlink.port(WRS_TX, BlockReader().decoder(), site=antenna.site, zone=antenna.zone)
             for antenna in radio.stations
         ]
-        self._station_out = [
-            self.stream_out(WRS_RX, site=antenna.site, zone=antenna.zone)
-            for antenna in radio.stations
-        ]
+        self._station_out = {
+            (index, antenna.uplink_channel): self.stream_out(
+                WRS_RX, site=antenna.site, zone=antenna.zone
+            )
+            for index, antenna in enumerate(radio.stations)
+        }
         self._train_ports = [
-            self.inputs.port(VRS_TX, BlockReader().read, train=train) for train in radio.trains
+            self.inputs.port(VRS_TX, BlockReader().decoder(), train=train) for train in radio.trains
         ]
         self._train_out = {
             (index, channel): self.stream_out(VRS_RX, train=train, channel=channel)
@@ -64,27 +66,34 @@ class RadioMediumNode(MediumNode[RadioMediumParameters], name="radio_medium", na
         """Deliver to every train what the stations send."""
         self._paths = self._medium.paths(antennas_of(items[self._state]))
         blocks = {
-            index: items[port].row
-            for index, port in enumerate(self._station_ports)
-            if port in items and not items[port].silent
+            index: block.row
+            for index, block in enumerate(map(items.get, self._station_ports))
+            if block is not None and not block.silent
         }
         tick, time_s = stamp_ns // self._tick_ns, stamp_ns * 1e-9
         self._received = self._medium.downlink(tick, time_s, self._paths, blocks)
+        silence = self._silence_at(stamp_ns)
         for port, publish in self._train_out.items():
-            publish(self._block(stamp_ns, port[1], self._received.get(port)))
+            if port in self._received:
+                publish(self._block(stamp_ns, port[1], self._received[port]))
+            else:
+                publish(silence[port[1]])
 
     def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
         """Deliver to every station what the trains return; the second leg."""
         blocks = {
-            index: (items[port].channel, items[port].row)
-            for index, port in enumerate(self._train_ports)
-            if port in items and not items[port].silent
+            index: (block.channel, block.row)
+            for index, block in enumerate(map(items.get, self._train_ports))
+            if block is not None and not block.silent
         }
         tick, time_s = stamp_ns // self._tick_ns, stamp_ns * 1e-9
         received = self._medium.uplink(tick, time_s, self._paths, blocks)
-        for index, publish in enumerate(self._station_out):
-            channel = self._radio.stations[index].uplink_channel
-            publish(self._block(stamp_ns, channel, received.get((index, channel))))
+        silence = self._silence_at(stamp_ns)
+        for port, publish in self._station_out.items():
+            if port in received:
+                publish(self._block(stamp_ns, port[1], received[port]))
+            else:
+                publish(silence[port[1]])
         self._links(stamp_ns, self._links_of(blocks, received))
 
     def _links_of(
@@ -106,12 +115,14 @@ class RadioMediumNode(MediumNode[RadioMediumParameters], name="radio_medium", na
                 links[train, 1] = up.snr
         return links
 
-    def _block(self, stamp_ns: int, channel: int, reception: Reception | None) -> bytes:
-        if reception is None:
-            return self._silence[channel].at(stamp_ns)
+    def _silence_at(self, stamp_ns: int) -> dict[int, WaveformView]:
+        """Silent block of the tick on each channel."""
+        return {channel: block.at(stamp_ns) for channel, block in self._silence.items()}
+
+    def _block(self, stamp_ns: int, channel: int, reception: Reception) -> Waveform:
         rate_hz, carrier_hz = self._radio.sample_rate_hz, self._radio.carriers_hz[channel]
         samples = reception.samples[None, :].astype(np.complex128)
-        return Waveform(stamp_ns, rate_hz, carrier_hz, channel, samples).to_cdr()
+        return Waveform(stamp_ns, rate_hz, carrier_hz, channel, samples)
 
 
 def antennas_of(state: Any) -> TrainAntennas:

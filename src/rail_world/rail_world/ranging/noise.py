@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-WORD = np.float32(2.0**-32)
-TURN = np.float32(2.0 * math.pi * 2.0**-32)
+from rail_signals.arrays import FloatArray
+from rail_world.noise_kernels import complex_blocks, complex_windows, words_at
+
+
+def noise_key(seed: int, stream: int) -> NDArray[np.uint64]:
+    """Key [2] of the counter-based generator of a stream."""
+    bits = np.random.Philox(np.random.SeedSequence([seed, stream]))
+    key: NDArray[np.uint64] = bits.state["state"]["key"].copy()
+    return key
 
 
 class PlacedWords:
     """Random words that depend on nothing but (seed, stream, stage, port, tick).
 
-    A counter-based generator is set to a place of its own for each block, so that neither the
+    A counter-based generator has a place of its own for each block, so that neither the
     order of the blocks nor a missing one changes any other.
 
     Parameters
@@ -24,28 +30,21 @@ class PlacedWords:
     """
 
     def __init__(self, seed: int, stream: int) -> None:
-        self._bits = np.random.Philox(np.random.SeedSequence([seed, stream]))
-        self._state = self._bits.state
+        self._key = noise_key(seed, stream)
 
     def draw(self, stage: int, ports: Sequence[int], tick: int, count: int) -> NDArray[np.uint64]:
         """Words [port, word]."""
-        state = self._state
-        words = np.empty((len(ports), count), dtype=np.uint64)
-        for row, port in zip(words, ports, strict=True):
-            state["state"]["counter"][:] = (0, stage, port, tick)
-            state["buffer_pos"] = 4
-            self._bits.state = state
-            row[:] = self._bits.random_raw(count)
-        return words
+        words = np.empty((len(ports), -(-count // 4), 4), dtype=np.uint64)
+        words_at(self._key, stage, np.array(ports, dtype=np.int64), tick, words)
+        return words.reshape(len(ports), -1)[:, :count]
 
 
 class NoiseSource:
     """Complex noise that depends on nothing but (seed, stage, port, tick).
 
-    One 64-bit word makes one complex
-    number (Box and Muller, 1958), in single precision: twice as fast as the generator's own
-    normals, and white noise has no use for more digits. The tails reach to 4.7 sigma of the
-    amplitude's 1 / sqrt(2) parts, 6.6 sigma of a part.
+    One 64-bit word makes one complex number (Box and Muller, 1958), in single precision: white
+    noise has no use for more digits. The tails reach to 4.7 sigma of the amplitude's
+    1 / sqrt(2) parts, 6.6 sigma of a part.
 
     Parameters
     ----------
@@ -55,21 +54,51 @@ class NoiseSource:
     """
 
     def __init__(self, seed: int, samples: int) -> None:
-        self._words = PlacedWords(seed, 1)
+        self._key = noise_key(seed, 1)
         self._samples = samples
 
-    def blocks(self, stage: int, ports: Sequence[int], tick: int) -> NDArray[np.complex64]:
-        """Noise [port, sample] with a mean power of 1."""
-        samples = self._samples
-        words = self._words.draw(stage, ports, tick, samples)
-        halves = words.view(np.uint32).astype(np.float32)
-        # From (0, 2^32]: a logarithm of zero would be infinite.
-        radius = halves[:, :samples]
-        radius += np.float32(0.5)
-        radius *= WORD
-        radius = np.sqrt(-np.log(radius))
-        angle = halves[:, samples:] * TURN
-        noise = np.empty(words.shape, dtype=np.complex64)
-        np.multiply(radius, np.cos(angle), out=noise.real)
-        np.multiply(radius, np.sin(angle), out=noise.imag)
+    def blocks(
+        self, stage: int, ports: Sequence[int], tick: int, power: FloatArray
+    ) -> NDArray[np.complex64]:
+        """Noise [port, sample] with a mean power [port]."""
+        noise = np.empty((len(ports), self._samples), dtype=np.complex64)
+        sigma = np.sqrt(power).astype(np.float32)
+        out = noise.view(np.float32)
+        complex_blocks(self._key, stage, np.array(ports, dtype=np.int64), tick, sigma, out)
+        return noise
+
+    def windows(
+        self,
+        stage: int,
+        windows: NDArray[np.int64],
+        tick: int,
+        power: FloatArray,
+        antennas: int,
+    ) -> NDArray[np.complex64]:
+        """Noise at several antennas in windows of a long stretch, one after the other.
+
+        A sample is the same in whatever window it is. The stretch is a row of blocks, each of
+        which belongs to all antennas in turn; the block after that of one port is that of the
+        next port.
+
+        Parameters
+        ----------
+        stage, tick : int
+        windows : int64 [window, 3]
+            Port of the first block of the stretch, first sample in the stretch, sample after the
+            last.
+        power : float64 [window]
+            Mean power of a sample.
+        antennas : int
+            Divides the length of a block.
+
+        Returns
+        -------
+        complex64 [antenna, sample], the samples of all windows side by side
+        """
+        lengths = windows[:, 2] - windows[:, 1]
+        noise = np.empty((antennas, int(lengths.sum())), dtype=np.complex64)
+        sigma = np.sqrt(power).astype(np.float32)
+        each = self._samples // antennas
+        complex_windows(self._key, stage, windows, tick, each, sigma, noise.view(np.float32))
         return noise

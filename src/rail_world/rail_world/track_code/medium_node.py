@@ -37,7 +37,7 @@ class RailMediumNode(MediumNode[RailMediumParameters], name="rail_medium", names
         self._medium = RailMedium(rails, world.seed, world.tick_s)
         self._lengths_m = np.array([train.vehicle.length_m for train in world.trains])
         self._ports = [
-            self.inputs.port(CIRCUIT_TX, BlockReader().read, circuit=circuit.name)
+            self.inputs.port(CIRCUIT_TX, BlockReader().decoder(), circuit=circuit.name)
             for circuit in rails.circuits
         ]
         self._state = self.state_port(self.inputs, len(world.trains))
@@ -67,10 +67,10 @@ class RailMediumNode(MediumNode[RailMediumParameters], name="rail_medium", names
         for publish, samples in zip(self._circuit_out, arrived.circuits, strict=True):
             publish(self._block(stamp_ns, samples))
 
-    def _block(self, stamp_ns: int, samples: NDArray[np.float64]) -> bytes:
+    def _block(self, stamp_ns: int, samples: NDArray[np.float64]) -> Waveform:
         return Waveform(
             stamp_ns, self._rails.sample_rate_hz, 0.0, 0, samples[None].astype(np.complex128)
-        ).to_cdr()
+        )
 
 
 if __name__ == "__main__":

@@ -8,15 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_world.ranging.noise import TURN, WORD, PlacedWords
+from rail_world.noise_kernels import real_blocks
+from rail_world.ranging.noise import PlacedWords, noise_key
+
+_STREAM = 4
 
 
 class RealNoiseSource:
     """Real noise that depends on nothing but (seed, stage, port, tick).
 
     The real sister of `rail_world.ranging.noise.NoiseSource`, on a stream of its own. One 64-bit
-    word
-    makes two normals (Box and Muller, 1958), in single precision; the tails reach to 6.6 sigma.
+    word makes two normals (Box and Muller, 1958), in single precision; the tails reach to
+    6.6 sigma.
 
     Parameters
     ----------
@@ -26,21 +29,15 @@ class RealNoiseSource:
     """
 
     def __init__(self, seed: int, samples: int) -> None:
-        self._words = PlacedWords(seed, 4)
+        self._words = PlacedWords(seed, _STREAM)
+        self._key = noise_key(seed, _STREAM)
         self._samples = samples
 
     def blocks(self, stage: int, ports: Sequence[int], tick: int) -> NDArray[np.float32]:
         """White Gaussian noise [port, sample] with a variance of 1."""
-        half = (self._samples + 1) // 2
-        halves = self._words.draw(stage, ports, tick, half).view(np.uint32).astype(np.float32)
-        # From (0, 2^32]: a logarithm of zero would be infinite.
-        radius = halves[:, :half]
-        radius += np.float32(0.5)
-        radius *= WORD
-        radius = np.sqrt(np.float32(-2.0) * np.log(radius))
-        angle = halves[:, half:] * TURN
-        noise = np.concatenate((radius * np.cos(angle), radius * np.sin(angle)), axis=1)
-        return noise[:, : self._samples]
+        noise = np.empty((len(ports), self._samples), dtype=np.float32)
+        real_blocks(self._key, stage, np.array(ports, dtype=np.int64), tick, noise)
+        return noise
 
     def impulses(
         self, stage: int, ports: Sequence[int], tick: int, mean_count: float

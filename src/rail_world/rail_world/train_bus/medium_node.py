@@ -6,7 +6,6 @@ Topics out: both terminals' ``rx``, the reflectometer's ``rx``, ``~/links``, ``~
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import log10, nan
 from typing import Any, NamedTuple
@@ -14,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_msgs_py.decoders import stamped
+from rail_msgs_py.decoders import waveform
+from rail_msgs_py.delivery import Send
 from rail_msgs_py.topics.train_bus import (
     BUS_LINKS,
     BUS_RX,
@@ -41,9 +41,9 @@ class _BusTrain(NamedTuple):
     head: str
     tail: str
     reflectometer: str
-    to_head: Callable[[bytes], None]
-    to_tail: Callable[[bytes], None]
-    to_reflectometer: Callable[[bytes], None]
+    to_head: Send
+    to_tail: Send
+    to_reflectometer: Send
 
 
 class BusMediumNode(MediumNode[BusMediumParameters], name="bus_medium", namespace="/world"):
@@ -54,13 +54,12 @@ class BusMediumNode(MediumNode[BusMediumParameters], name="bus_medium", namespac
         bus = self.part("train_bus", BusDescription)
         self._rate_hz = bus.sample_rate_hz
         self._tick_ns = self._world.tick_ns
-        read = stamped(Waveform.from_cdr)
         self._trains = [
             _BusTrain(
                 medium,
-                self.inputs.port(BUS_TX, read, train=name, end="head"),
-                self.inputs.port(BUS_TX, read, train=name, end="tail"),
-                self.inputs.port(REFLECTOMETER_TX, read, train=name),
+                self.inputs.port(BUS_TX, waveform, train=name, end="head"),
+                self.inputs.port(BUS_TX, waveform, train=name, end="tail"),
+                self.inputs.port(REFLECTOMETER_TX, waveform, train=name),
                 self.stream_out(BUS_RX, train=name, end="head"),
                 self.stream_out(BUS_RX, train=name, end="tail"),
                 self.stream_out(REFLECTOMETER_RX, train=name),
@@ -87,7 +86,7 @@ class BusMediumNode(MediumNode[BusMediumParameters], name="bus_medium", namespac
         """Deliver a frame; the energy of its bits over the noise density [dB]."""
         publish = train.to_tail if to_tail else train.to_head
         if block is None or block.silent or block.sample_rate_hz != self._rate_hz:
-            publish(silence(stamp_ns, self._rate_hz, 0.0, 0).to_cdr())
+            publish(silence(stamp_ns, self._rate_hz, 0.0, 0))
             return nan
         sent = np.ascontiguousarray(block.row.real)
         arrived = train.medium.carry(tick, stamp_ns * 1e-9, sent, to_tail=to_tail)
@@ -97,15 +96,15 @@ class BusMediumNode(MediumNode[BusMediumParameters], name="bus_medium", namespac
     def _reflect(self, train: _BusTrain, tick: int, stamp_ns: int, block: Waveform | None) -> None:
         if block is None or block.silent:
             rate_hz = self._rate_hz if block is None else block.sample_rate_hz
-            train.to_reflectometer(silence(stamp_ns, rate_hz, 0.0, 0).to_cdr())
+            train.to_reflectometer(silence(stamp_ns, rate_hz, 0.0, 0))
             return
         sent = np.ascontiguousarray(block.samples.real)
         seen = train.medium.reflect(tick, stamp_ns * 1e-9, sent, block.sample_rate_hz)
         train.to_reflectometer(_block(stamp_ns, block.sample_rate_hz, seen))
 
 
-def _block(stamp_ns: int, rate_hz: float, rows: NDArray[np.float64]) -> bytes:
-    return Waveform(stamp_ns, rate_hz, 0.0, 0, rows.astype(np.complex128)).to_cdr()
+def _block(stamp_ns: int, rate_hz: float, rows: NDArray[np.float64]) -> Waveform:
+    return Waveform(stamp_ns, rate_hz, 0.0, 0, rows.astype(np.complex128))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ the zone controller's ``telegrams`` for each. Topics out: ``~/<base>/uplink_tele
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rail_msgs_py.decoders import stamped
+from rail_msgs_py.delivery import Send
 from rail_msgs_py.parameters import parameter
 from rail_msgs_py.quantities import GIVE_UP
 from rail_msgs_py.tick_inputs import TickInputs
@@ -96,7 +97,7 @@ def _frames(ports: Mapping[str, str], items: Mapping[str, Telegrams]) -> Carried
     return {base: list(items[port].frames) for base, port in ports.items() if port in items}
 
 
-def _publish(out: Mapping[str, Callable[[bytes], None]], stamp_ns: int, carried: Carried) -> None:
+def _publish(out: Mapping[str, Send], stamp_ns: int, carried: Carried) -> None:
     for base, publish in out.items():
         publish(telegrams(stamp_ns, carried[base]))
 

@@ -24,37 +24,7 @@ COLUMNS = (
     *("path_m", "x_m", "y_m", "z_m", "heading_rad", "speed_mps", "acceleration_mps2"),
     *("track_index", "chainage_m", "on_line"),
 )
-_MIN_DISTANCE_M = 1.0
-
-
-@dataclass(frozen=True)
-class Run:
-    """The way of one train past one mast in a tick.
-
-    ``path_m``, ``speed_mps``, ``acceleration_mps2`` of the train, ``distance_m`` to the mast and
-    ``sight`` as in `Links`, all at the end of the tick; ``amplitude`` gains at its begin and end.
-    """
-
-    path_m: float
-    speed_mps: float
-    acceleration_mps2: float
-    distance_m: float
-    sight: float
-    amplitude: tuple[float, float]
-    tick_s: float
-
-    def moved_m(self, time_s: FloatArray) -> FloatArray:
-        """Way since the end of the tick [m] at a time from its begin [s]."""
-        return _moved(self.speed_mps, self.acceleration_mps2, time_s - self.tick_s)
-
-    def distance_after(self, moved_m: FloatArray) -> FloatArray:
-        """Distance to the mast [m] after that way."""
-        return _distance(self.distance_m, self.sight, moved_m)
-
-    def gain(self, time_s: FloatArray) -> FloatArray:
-        """Amplitude gain without fading at a time from the begin of the tick [s]."""
-        start, end = self.amplitude
-        return np.asarray(start + (end - start) * (time_s / self.tick_s))
+MIN_DISTANCE_M = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,19 +48,6 @@ class Links:
     speed_mps: FloatArray
     acceleration_mps2: FloatArray
 
-    def run(self, base: int, train: int, direction: int) -> Run:
-        """One of them."""
-        start, end = (10.0 ** (self.gain_db[direction, :, base, train] / 20.0)).tolist()
-        return Run(
-            float(self.path_m[train]),
-            float(self.speed_mps[train]),
-            float(self.acceleration_mps2[train]),
-            float(self.distance_m[base, train]),
-            float(self.sight[base, train]),
-            (start, end),
-            self.tick_s,
-        )
-
 
 class LinkGeometry:
     """Makes the links of a tick from the truth.
@@ -109,6 +66,12 @@ class LinkGeometry:
         self._position_m = np.array([mast.position_m for mast in masts])
         self._mast_m = np.array([mast.chainage_m for mast in masts])
         self._mast_track = np.array([tracks[mast.track] for mast in masts])
+        self._carrier_hz = np.array(
+            [
+                [carriers_hz[mast.channel] for mast in masts]
+                for carriers_hz in (description.downlink_hz, description.uplink_hz)
+            ]
+        )
         self._sections = [(tracks[s.track], s, s.section()) for s in description.sections]
 
     def links(self, tick: int, time_s: float, state: FloatArray) -> Links:
@@ -119,7 +82,7 @@ class LinkGeometry:
         table = dict(zip(COLUMNS, state.T.copy(), strict=True))
         position_m = np.stack((table["x_m"], table["y_m"], table["z_m"]), axis=1)
         line = position_m - self._position_m[:, None, :]
-        distance_m = np.maximum(np.sqrt(np.einsum("btk,btk->bt", line, line)), _MIN_DISTANCE_M)
+        distance_m = np.maximum(np.sqrt(np.einsum("btk,btk->bt", line, line)), MIN_DISTANCE_M)
         along = np.stack((np.cos(table["heading_rad"]), np.sin(table["heading_rad"])), axis=1)
         sight = np.einsum("btk,tk->bt", line[..., :2], along) / distance_m
         v, a = table["speed_mps"], table["acceleration_mps2"]
@@ -137,14 +100,9 @@ class LinkGeometry:
 
     def _path_db(self, distance_m: FloatArray) -> FloatArray:
         """Path loss [direction, base, train]."""
-        radio = self._radio
-        loss_db = np.empty((2, *distance_m.shape))
-        for direction, carriers_hz in enumerate((radio.downlink_hz, radio.uplink_hz)):
-            for base, mast in enumerate(radio.base_stations):
-                loss_db[direction, base] = path_loss_db(
-                    distance_m[base], carriers_hz[mast.channel], exponent=radio.path_loss_exponent
-                )
-        return loss_db
+        return path_loss_db(
+            distance_m, self._carrier_hz[:, :, None], exponent=self._radio.path_loss_exponent
+        )
 
     def _sections_db(self, track: FloatArray, chainage_m: FloatArray) -> FloatArray:
         """Loss in cuttings and tunnels [base, train].
@@ -173,4 +131,4 @@ def _moved(speed_mps: Any, acceleration_mps2: Any, time_s: Any) -> FloatArray:
 def _distance(distance_m: Any, sight: Any, moved_m: FloatArray) -> FloatArray:
     """Distance from a mast [m] after a straight way along the heading."""
     square = distance_m * distance_m + moved_m * (2.0 * distance_m * sight + moved_m)
-    return np.asarray(np.sqrt(np.maximum(square, _MIN_DISTANCE_M**2)))
+    return np.asarray(np.sqrt(np.maximum(square, MIN_DISTANCE_M**2)))

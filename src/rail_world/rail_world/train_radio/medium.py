@@ -22,7 +22,6 @@ Left out: delay (3.3 us/km; the radios advance their timing), errors of oscillat
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -37,12 +36,11 @@ from rail_world.ranging.medium import THERMAL_NOISE_DBM_PER_HZ
 from rail_world.ranging.noise import NoiseSource
 
 from .description import CbtcDescription
-from .fading import LinkFading
+from .fading import FadingLinks, Piece
 from .links import DOWNLINK, UPLINK, LinkGeometry, Links
 
 __all__ = ["Burst", "CbtcMedium", "Links"]
 
-_FADING_STREAM = 7
 _STAGE = (11, 12)  # of the noise; the ranging radio has 1 and 2 of the same stream
 _NOISE_SAMPLES = 256
 _MOST_NOISE_BLOCKS = 1 << 24
@@ -101,15 +99,23 @@ class CbtcMedium:
     def __init__(self, description: CbtcDescription, seed: int, tick_s: float = 0.1) -> None:
         self.description = description
         self.samples = whole_samples(description.sample_rate_hz, tick_s)
-        self._seed = seed
         self._geometry = LinkGeometry(description, tick_s)
         self._channel = [mast.channel for mast in description.base_stations]
         base, train = description.base_antennas, description.train_antennas
-        self._antennas = ((train, base), (base, train))  # [direction] of (receiver, sender)
+        # [direction] of (receiver, sender)
+        self._antennas = antennas = ((train, base), (base, train))
         figure_db = THERMAL_NOISE_DBM_PER_HZ + description.noise_figure_db
         self.noise_mw: float = 10.0 ** (figure_db / 10.0) * description.sample_rate_hz
-        self._noise = [NoiseSource(seed, rx * _NOISE_SAMPLES) for rx, _ in self._antennas]
-        self._fading: dict[tuple[int, int, int], LinkFading] = {}
+        self._noise = [NoiseSource(seed, rx * _NOISE_SAMPLES) for rx, _ in antennas]
+        carriers_hz = description.downlink_hz, description.uplink_hz
+        self._fading = [
+            FadingLinks(
+                *(seed, direction, *antennas[direction]),
+                [carriers_hz[direction][channel] for channel in self._channel],
+                *(description.rician_factor, description.sample_rate_hz),
+            )
+            for direction in (DOWNLINK, UPLINK)
+        ]
 
     def links(self, tick: int, time_s: float, state: FloatArray) -> Links:
         """Geometry and gains of all links.
@@ -228,74 +234,43 @@ class CbtcMedium:
         self, links: Links, direction: int, ports: Mapping[_Key, _Port]
     ) -> dict[_Key, tuple[Burst, ...]]:
         """Noise in all windows of all ports, and what their sources bring into them."""
+        if not ports:
+            return {}
+        spans, power_mw = [], []
         for port in ports.values():
             for start, stop in port.windows:
                 if not 0 <= start < stop <= self.samples:
                     raise ValueError(f"window {start, stop} is not in 0 ... {self.samples}")
+                spans.append((port.number * _MOST_NOISE_BLOCKS, start, stop))
+                power_mw.append(port.noise_mw)
+        heard = self._noise[direction].windows(
+            _STAGE[direction],
+            np.array(spans, dtype=np.int64).reshape(-1, 3),
+            links.tick,
+            np.array(power_mw),
+            self._antennas[direction][0],
+        )
         received: dict[_Key, tuple[Burst, ...]] = {}
+        on_air = _OnAir()
+        at = 0
         for key, port in ports.items():
-            windows = self._noise_in(links.tick, direction, port)
+            placed = []
+            for start, stop in port.windows:
+                placed.append((start, stop, at))
+                at += stop - start
+            received[key] = tuple(
+                Burst(start, heard[:, begin : begin + stop - start])
+                for start, stop, begin in placed
+            )
             for base, train, bursts in port.sources:
                 for burst in bursts:
-                    self._carry(links, (base, train, direction), burst, windows)
-            received[key] = windows
+                    self._check(burst, direction)
+                    on_air.add(base, train, burst, placed)
+        sent = on_air.sent()
+        # In the order of lengths: a sum must not depend on what other ports hear.
+        for count, pieces in sorted(on_air.pieces.items()):
+            self._fading[direction].add(links, pieces, count, sent, heard)
         return received
-
-    def _carry(
-        self, links: Links, link: tuple[int, int, int], burst: Burst, windows: tuple[Burst, ...]
-    ) -> None:
-        """Add what a burst brings over a link (base, train, direction) into the windows."""
-        self._check(burst, link[2])
-        rate_hz = self.description.sample_rate_hz
-        for start, stop in _pieces(burst):
-            listening = [w for w in windows if w.start < stop and start < w.stop]
-            if not listening:
-                continue
-            gains = self._fading_of(*link).gains(
-                links.run(*link), start / rate_hz, (stop - 1) / rate_hz, stop - start
-            )
-            sent = burst.samples[:, start - burst.start : stop - burst.start]
-            gains *= sent.astype(np.complex64)
-            arrived = gains.sum(axis=1)
-            for window in listening:
-                low, high = max(start, window.start), min(stop, window.stop)
-                into = slice(low - window.start, high - window.start)
-                window.samples[:, into] += arrived[:, low - start : high - start]
-
-    def _fading_of(self, base: int, train: int, direction: int) -> LinkFading:
-        """The one draw of a link in a direction."""
-        known = self._fading.get((base, train, direction))
-        if known is None:
-            key = [self._seed, _FADING_STREAM, base, train, direction]
-            rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(key)))
-            radio = self.description
-            carriers_hz = radio.uplink_hz if direction == UPLINK else radio.downlink_hz
-            carrier_hz = carriers_hz[self._channel[base]]
-            known = LinkFading(rng, *self._antennas[direction], carrier_hz, radio.rician_factor)
-            self._fading[base, train, direction] = known
-        return known
-
-    def _noise_in(self, tick: int, direction: int, port: _Port) -> tuple[Burst, ...]:
-        """White noise in every window of a port; of a sample it is the same in any window."""
-        blocks = [
-            range(start // _NOISE_SAMPLES, -(-stop // _NOISE_SAMPLES))
-            for start, stop in port.windows
-        ]
-        first = port.number * _MOST_NOISE_BLOCKS
-        places = [first + block for window in blocks for block in window]
-        drawn = self._noise[direction].blocks(_STAGE[direction], places, tick)
-        drawn *= np.float32(math.sqrt(port.noise_mw))
-        # [antenna, block, sample]
-        drawn = drawn.reshape(len(places), -1, _NOISE_SAMPLES).transpose(1, 0, 2)
-        windows: list[Burst] = []
-        at = 0
-        for (start, stop), window in zip(port.windows, blocks, strict=True):
-            rows = drawn[:, at : at + len(window)].reshape(len(drawn), -1)
-            at += len(window)
-            skip = start - window.start * _NOISE_SAMPLES
-            # A copy: windows that share a block must not share memory.
-            windows.append(Burst(start, rows[:, skip : skip + stop - start].copy()))
-        return tuple(windows)
 
     def _noise_mw(self, links: Links, channel: int) -> float:
         """Noise power of a receiver on a channel, jammers included."""
@@ -319,6 +294,44 @@ class CbtcMedium:
             raise ValueError(
                 f"burst from {burst.start} to {burst.stop} is not in 0 ... {self.samples}"
             )
+
+
+class _OnAir:
+    """The bursts that somebody hears, side by side, and their pieces by length."""
+
+    def __init__(self) -> None:
+        self.pieces: dict[int, list[Piece]] = {}
+        self._bursts: list[Burst] = []
+        self._place: dict[int, int] = {}
+        self._end = 0
+
+    def add(
+        self, base: int, train: int, burst: Burst, windows: Sequence[tuple[int, int, int]]
+    ) -> None:
+        """Pieces of a burst on a link that windows (start, stop, place) listen to."""
+        if not any(start < burst.stop and burst.start < stop for start, stop, _ in windows):
+            return
+        place = self._place.get(id(burst))
+        if place is None:
+            place = self._place[id(burst)] = self._end
+            self._bursts.append(burst)
+            self._end += burst.samples.shape[1]
+        for begin, end in _pieces(burst):
+            overlaps = tuple(
+                (max(begin, start) - begin, min(end, stop) - begin, at + max(begin - start, 0))
+                for start, stop, at in windows
+                if start < end and begin < stop
+            )
+            if overlaps:
+                piece = Piece(base, train, begin, place + begin - burst.start, overlaps)
+                self.pieces.setdefault(end - begin, []).append(piece)
+
+    def sent(self) -> NDArray[np.float32]:
+        """All that is sent [part, antenna, sample]."""
+        if not self._bursts:
+            return np.empty((2, 0, 0), dtype=np.float32)
+        samples = np.concatenate([burst.samples for burst in self._bursts], axis=1)
+        return np.array((samples.real, samples.imag), dtype=np.float32)
 
 
 def _pieces(burst: Burst) -> Iterator[tuple[int, int]]:

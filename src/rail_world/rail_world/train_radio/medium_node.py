@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_msgs_py.decoders import stamped
+from rail_msgs_py.decoders import waveform
 from rail_msgs_py.parameters import parameter
 from rail_msgs_py.topics.train_radio import (
     CBTC_BASE_RX,
@@ -44,11 +44,10 @@ class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", names
         self._radio = radio = self.part("train_radio", CbtcDescription)
         self._tick_ns = self._world.tick_ns
         self._medium = CbtcMedium(radio, self._world.seed, self._world.tick_s)
-        read = stamped(Waveform.from_cdr)
         bases = [base.name for base in radio.base_stations]
-        self._base_ports = [self.inputs.port(CBTC_BASE_TX, read, base=base) for base in bases]
+        self._base_ports = [self.inputs.port(CBTC_BASE_TX, waveform, base=base) for base in bases]
         self._train_ports = [
-            self.inputs.port(CBTC_TRAIN_TX, read, train=train) for train in radio.trains
+            self.inputs.port(CBTC_TRAIN_TX, waveform, train=train) for train in radio.trains
         ]
         self._state = self.state_port(self.inputs, len(radio.trains))
         self._base_out = [self.stream_out(CBTC_BASE_RX, base=base) for base in bases]
@@ -56,6 +55,10 @@ class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", names
             (index, channel): self.stream_out(CBTC_TRAIN_RX, train=train, channel=channel)
             for index, train in enumerate(radio.trains)
             for channel in radio.downlink_hz
+        }
+        self._windows = {
+            (train, channel): (self._span(0), self._span(1 + train))
+            for train, channel in self._train_out
         }
         self._links = self.table_out(CBTC_LINKS, radio.trains)
         self._silence_down = self._silences(radio.downlink_hz)
@@ -93,15 +96,12 @@ class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", names
         length = self._p.burst_samples
         sent = {}
         for base, block in blocks.items():
-            slots = range(block.shape[1] // length)
-            parts = [(first, block[:, first:end]) for first, end in map(self._span, slots)]
+            slots = block.shape[1] // length
+            used = block[:, : slots * length].reshape(len(block), slots, length).any(axis=(0, 2))
+            spans = map(self._span, np.flatnonzero(used).tolist())
             antennas = self._radio.base_antennas
-            sent[base] = [_burst(first, part, antennas) for first, part in parts if part.any()]
-        windows = {
-            (train, channel): (self._span(0), self._span(1 + train))
-            for train, channel in self._train_out
-        }
-        received = self._medium.downlink(links, sent, windows)
+            sent[base] = [_burst(first, block[:, first:end], antennas) for first, end in spans]
+        received = self._medium.downlink(links, sent, self._windows)
         for key, publish in self._train_out.items():
             channel = key[1]
             if key not in received:
@@ -144,9 +144,9 @@ class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", names
                 samples[:, burst.start : burst.stop] = burst.samples
             publish(self._block(stamp_ns, self._radio.uplink_hz[channel], channel, samples))
 
-    def _block(self, stamp_ns: int, carrier_hz: float, channel: int, samples: Any) -> bytes:
+    def _block(self, stamp_ns: int, carrier_hz: float, channel: int, samples: Any) -> Waveform:
         rate_hz = self._radio.sample_rate_hz
-        return Waveform(stamp_ns, rate_hz, carrier_hz, channel, samples).to_cdr()
+        return Waveform(stamp_ns, rate_hz, carrier_hz, channel, samples)
 
     def _publish_links(self, stamp_ns: int, links: Links) -> None:
         down, up = self._medium.snr(links), self._medium.snr(links, uplink=True)

@@ -40,9 +40,9 @@ def test_a_report_and_an_authority_in_words(reader: TelegramReader) -> None:
     report = frame(FrameKind.LOCATION_REPORT, 1, CONTROLLER_IDENTITY, REPORT.to_bytes())
     authority = frame(FrameKind.MOVEMENT_AUTHORITY, CONTROLLER_IDENTITY, 2, AUTHORITY.to_bytes())
     log = MessageLog()
-    log.put(reader.entries("/first/atp/telegrams", telegrams(500_000_000, [(1, report)])))
+    log.put(reader.entries("/first/atp/telegrams", telegrams(500_000_000, [(1, report)]).to_cdr()))
     topic = "/wayside/zone_controller/base3/telegrams"
-    log.put(reader.entries(topic, telegrams(750_000_000, [(2, authority)])))
+    log.put(reader.entries(topic, telegrams(750_000_000, [(2, authority)]).to_cdr()))
     one, other = log.since(0)
     assert (one["from"], one["to"], one["kind"]) == ("first", "zone controller", "location report")
     assert one["text"] == "front at 1234.5 m on main ± 3.0 m, 72 km/h"
@@ -70,7 +70,9 @@ def test_no_frame_is_too_strange_to_be_shown(raw: bytes) -> None:
 def test_the_log_is_of_bounded_length(reader: TelegramReader) -> None:
     noise, log = np.random.default_rng(1).bytes(FRAME_BYTES), MessageLog()
     for _ in range(MOST_LINES // 8 + 5):
-        log.put(reader.entries("/first/cbtc_radio/telegrams", telegrams(0, [(1, noise)] * 8)))
+        log.put(
+            reader.entries("/first/cbtc_radio/telegrams", telegrams(0, [(1, noise)] * 8).to_cdr())
+        )
     lines = log.since(0)
     assert len(lines) == MOST_LINES
     assert lines[-1]["id"] == 8 * (MOST_LINES // 8 + 5)

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from rail_signals.train_radio.ber.closed_form import ALAMOUTI_2X2, SCHEMES, SISO, error_rate
-from rail_signals.train_radio.ber.link import DiversityLink
+from rail_signals.train_radio.ber.link import LANES, DiversityLink
 from rail_signals.train_radio.ber.monte_carlo import Result, clopper_pearson, until
 from rail_signals.train_radio.ber.plain_link import PlainLink
 from rail_signals.train_radio.ber.stale_channel import stale_error_rate
@@ -25,10 +25,12 @@ BITS = pytest.mark.parametrize("bits", [1, 2], ids=["bpsk", "qpsk"])
 def test_decisions_are_those_of_the_equations(
     scheme: Scheme, bits: int, correlation: float
 ) -> None:
-    link = DiversityLink(scheme, 3.0, bits_per_symbol=bits, correlation=correlation)
-    generator = np.random.SFC64(11)
+    link = DiversityLink(
+        scheme, 3.0, bits_per_symbol=bits, correlation=correlation, code_blocks=LANES
+    )
+    generator = np.random.SFC64(12)
     disagreed = 0
-    for _ in range(4):
+    for _ in range(64):
         errors, squares = link.step(generator)
         last = link.last()
         found = naive(scheme, last["sent"], last["channel"], last["noise"])
@@ -109,7 +111,7 @@ def test_the_same_seed_gives_the_same_result() -> None:
 
 def deviates(draws: int) -> np.ndarray:
     """Normal deviates of the engine, of unit variance [draws]."""
-    link = DiversityLink(ALAMOUTI_2X2, 2.0, code_blocks=8192)
+    link = DiversityLink(ALAMOUTI_2X2, 2.0, code_blocks=LANES)
     generator, parts = np.random.SFC64(21), []
     while sum(p.size for p in parts) < draws:
         link.step(generator)
@@ -131,7 +133,7 @@ def test_deviates_are_normal() -> None:
 
 def test_256_directions_give_the_normal_tail() -> None:
     # P(r cos > x) of a radius without limit and directions of one part in 256.
-    cosine = np.cos(np.arange(256) * (math.pi / 128))
+    cosine = np.cos((np.arange(256) + 0.5) * (math.pi / 128))
     forward = cosine[cosine > 1e-9]
     for x in (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0):
         tail = np.exp(-((x / forward) ** 2) / 2).sum() / 256
@@ -154,7 +156,7 @@ def test_errors_of_a_block_come_together() -> None:
 
 def test_intervals_hold_as_often_as_they_say() -> None:
     truth = float(error_rate(SISO, 3.0))
-    link, generator = DiversityLink(SISO, 3.0, code_blocks=256), np.random.SFC64(8)
+    link, generator = DiversityLink(SISO, 3.0, code_blocks=LANES), np.random.SFC64(8)
     runs = 400
     held = sum(
         until(link, generator, max_bits=8192, min_errors=10**6).holds(truth) for _ in range(runs)
@@ -164,7 +166,7 @@ def test_intervals_hold_as_often_as_they_say() -> None:
 
 def test_stops_for_each_reason() -> None:
     generator = np.random.SFC64(6)
-    link = DiversityLink(ALAMOUTI_2X2, 1.0, code_blocks=256)
+    link = DiversityLink(ALAMOUTI_2X2, 1.0, code_blocks=LANES)
     tight = until(link, generator, half_width=0.1, confidence=0.95, min_errors=1)
     width = (tight.interval[1] - tight.interval[0]) / 2
     assert 0.08 * tight.rate < width <= 0.1 * tight.rate

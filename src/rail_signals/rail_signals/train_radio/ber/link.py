@@ -5,41 +5,29 @@ receiver and symbol; sends the symbols (eq 1), adds up what each receiver hears 
 corrected), combines it with the first symbol's channel (eqs 6, 8) and decides by the signs
 (eq 9; the divisor is positive).
 
-Speed comes from how it is computed. Values are float32, real and imaginary parts apart, in
-buffers that stay in the cache. In real numbers both transmission and combining are products
-with one matrix G of +-Re h and +-Im h per code block,
-
-    y = G s + z,   s~ = G^T y,   s = (Re x1, Re x2, Im x2, Im x1),
-
-in this order of s a *sliding window* over six rows, (h1, h2, -h1) and (j h2, j h1, -j h2):
-one `einsum` each without a copy of G. G^T G is the identity times the branches' energy by
-eq 2, but nothing here relies on that: s~ is computed from y.
-
-Normal deviates are those of Box and Muller from one word of 32 bits w per pair: radius
-``sqrt(-ln u)``, ``u = (w | 1) / 2^32``, direction by the low 8 bits of w. So the radius
-reaches 6.7 standard deviations of one part; beyond 5.7 (probability 6e-8), where u has only 8
-bits left, it depends on the direction. Means over 256 equal directions are the midpoint
-rule for Craig's integral: Q(x) comes out within 1e-6 of itself up to x = 6.
+A compiled kernel does that in single precision for `LANES` code blocks at a time, in buffers that
+stay in the first-level cache. Symbols have the parts +-1; G^H G is the identity times the
+branches' energy by eq 2, but nothing here relies on that: what is decided is computed from what
+was received.
 """
 
 from __future__ import annotations
 
-import math
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
 from numpy.random import BitGenerator
-from numpy.typing import NDArray
 
 from rail_signals.arrays import ComplexArray
+from rail_signals.compiled import compiled
 from rail_signals.train_radio.space_time_block import Scheme
 
-SingleArray: TypeAlias = NDArray[np.float32]
+from .deviates import SingleArray, WordArray, draw_words, normal_deviates, seeded_lanes
 
-_SCALE = np.float32(2.0**-32)
-_TURN = np.float32(2 * math.pi / 256)
-_BYTE = np.uint32(255)
+LANES = 512
+"""Code blocks that are simulated side by side."""
+
+_ONE = np.uint32(1)
 
 
 class DiversityLink:
@@ -56,7 +44,7 @@ class DiversityLink:
     correlation
         Of the channel between the two symbols; 1 if it is constant (eq 3).
     code_blocks
-        Code blocks per step, a multiple of 8.
+        Code blocks per step, a multiple of `LANES`.
 
     Raises
     ------
@@ -66,7 +54,7 @@ class DiversityLink:
     Examples
     --------
     >>> from rail_signals.train_radio.ber.closed_form import ALAMOUTI_2X2
-    >>> link = DiversityLink(ALAMOUTI_2X2, math.inf)
+    >>> link = DiversityLink(ALAMOUTI_2X2, float("inf"))
     >>> link.step(np.random.SFC64(1)), link.bits_per_step
     ((0, 0), 32768)
     """
@@ -86,44 +74,23 @@ class DiversityLink:
             raise ValueError(f"bits_per_symbol must be 1 or 2, got {bits_per_symbol!r}")
         if not 0 <= correlation <= 1:
             raise ValueError(f"correlation must be in [0, 1], got {correlation!r}")
-        if code_blocks < 8 or code_blocks % 8:
-            raise ValueError(f"code_blocks must be a multiple of 8, got {code_blocks!r}")
+        if code_blocks < LANES or code_blocks % LANES:
+            raise ValueError(f"code_blocks must be a multiple of {LANES}, got {code_blocks!r}")
         self.scheme = scheme
         self.bits_per_symbol = bits_per_symbol
         self.correlation = correlation
-        n, tx, rx, parts = code_blocks, scheme.transmit, scheme.receive, bits_per_symbol
-        self.bits_per_step = 2 * parts * n
-        self._blocks = n
-        self._moves = correlation < 1
-        links = tx * rx * (2 if self._moves else 1)
-        self._links, self._pairs = links, links + 2 * rx
-        # Powers by which each pair's squared radius is scaled, negative as log u is. A bit has
-        # energy 1 in all; the transmitters' shares are in the noise.
-        self._link_powers = np.full((links, 1), -1, dtype=np.float32)
-        self._link_powers[tx * rx :] = correlation**2 - 1
+        self.bits_per_step = 2 * bits_per_symbol * code_blocks
+        self._tiles = code_blocks // LANES
+        tx, rx = scheme.transmit, scheme.receive
+        # A bit has energy 1 in all; the transmitters' shares are in the noise. Powers are negative
+        # as the logarithm of a uniform deviate is.
+        self._correlation = np.float32(correlation)
+        self._innovation_power = np.float32(correlation**2 - 1)
         self._noise_power = np.float32(-tx / eb_n0)
-
-        def buffer(*shape: int) -> SingleArray:
-            return np.zeros((*shape, n), dtype=np.float32)
-
-        self._word = np.empty((self._pairs, n), dtype=np.uint32)
-        self._radius = buffer(self._pairs)
-        self._direction = buffer(2, self._pairs)
-        self._noise = buffer(rx, 2, 2)
-        self._received, self._symbol, self._estimated = (
-            buffer(rx, 2, 2),
-            buffer(parts, 2),
-            buffer(parts, 2),
-        )
-        self._rows = [buffer(rx, parts, 3 if tx == 2 else 1, 2) for _ in range(1 + self._moves)]
-        self._matrices = [self._window(rows) for rows in self._rows]
-        self._shift = (1 << np.arange(2 * parts)).astype(np.int8).reshape(parts, 2, 1)
-        self._sign = np.empty((parts, 2, n), dtype=np.int8)
-        self._sent = np.empty((parts, 2, n), dtype=np.bool_)
-        self._decided = np.empty((parts, 2, n), dtype=np.bool_)
-        self._wrong = np.empty((parts, 2, n), dtype=np.bool_)
-        self._count = np.empty(n, dtype=np.uint8)
-        self._squares = np.empty(n, dtype=np.float32)
+        self._channel = np.zeros((1 + (correlation < 1), rx, tx, 2, LANES), dtype=np.float32)
+        self._noise = np.zeros((rx, 2, 2, LANES), dtype=np.float32)
+        self._sent = np.zeros((2, 2, LANES), dtype=np.float32)
+        self._sums = np.zeros((2, 2, LANES), dtype=np.float32)
 
     def step(self, generator: BitGenerator) -> tuple[int, int]:
         """Simulate `code_blocks` blocks.
@@ -134,114 +101,20 @@ class DiversityLink:
             Wrong bits, and the sum over code blocks of the square of their number: bits of a
             block share a channel, so that errors come in groups.
         """
-        # The generator's own arrays are the only memory taken; draws are used where they lie.
-        self._draw_bits(generator.random_raw(self._blocks // 8).view(np.int8))
-        self._draw_fading(generator.random_raw(self._pairs * self._blocks // 2).view(np.uint32))
-        self._transmit()
-        self._combine()
-        return self._compare()
-
-    def _draw_bits(self, octets: NDArray[np.int8]) -> None:
-        # Bit 7 - k of an octet becomes the sign of row k; products are faster than shifts.
-        np.multiply(octets, self._shift, out=self._sign)
-        np.less(self._sign, 0, out=self._sent)
-        np.right_shift(self._sign, 7, out=self._sign)
-        np.bitwise_or(self._sign, 1, out=self._sign)
-        np.copyto(self._symbol, self._sign)
-
-    def _draw_fading(self, words: NDArray[np.uint32]) -> None:
-        """Channels and noise: complex normal deviates by Box and Muller."""
-        words = words.reshape(self._word.shape)
-        radius, (cosine, sine), links = self._radius, self._direction, self._links
-        np.bitwise_and(words, _BYTE, out=self._word)
-        np.copyto(cosine, self._word, casting="unsafe")
-        np.multiply(cosine, _TURN, out=cosine)
-        np.sin(cosine, out=sine)
-        np.cos(cosine, out=cosine)
-        np.bitwise_or(words, np.uint32(1), out=self._word)  # never zero
-        np.copyto(radius, self._word, casting="unsafe")
-        np.multiply(radius, _SCALE, out=radius)
-        np.log(radius, out=radius)
-        np.multiply(radius[:links], self._link_powers, out=radius[:links])
-        np.multiply(radius[links:], self._noise_power, out=radius[links:])
-        np.sqrt(radius, out=radius)
-        tx, rx, n = self.scheme.transmit, self.scheme.receive, self._blocks
-        first = 0
-        for rows in self._rows:
-            some = slice(first, first + tx * rx)
-            first += tx * rx
-            shape = (rx, tx, 1, n)
-            np.multiply(radius[some].reshape(shape), self._parts(some, rx, tx), out=rows[:, 0, :tx])
-        np.multiply(
-            radius[links:].reshape(rx, 2, 1, n),
-            self._parts(slice(links, None), rx, 2),
-            out=self._noise,
+        errors, squares = _simulate(
+            self._tiles,
+            seeded_lanes(generator, LANES),
+            self.bits_per_symbol,
+            (self._correlation, self._innovation_power, self._noise_power),
+            self._channel,
+            self._noise,
+            self._sent,
+            self._sums,
         )
-        if self._moves:
-            now, later = (rows[:, 0, :tx] for rows in self._rows)
-            scaled = self._direction.reshape(-1)[: now.size].reshape(now.shape)  # not needed again
-            np.multiply(now, np.float32(self.correlation), out=scaled)
-            np.add(later, scaled, out=later)
-        for rows in self._rows:
-            self._complete(rows)
-
-    def _parts(self, pairs: slice, *shape: int) -> SingleArray:
-        """Cosine and sine of some pairs: a view [*shape, 2, code blocks]."""
-        part = self._direction[:, pairs].reshape(2, *shape, self._blocks)
-        return np.moveaxis(part, 0, -2)
-
-    def _complete(self, rows: SingleArray) -> None:
-        """Rows of the window from (h1, h2): -h1, and j times h2, h1, -h2."""
-        alamouti = self.scheme.transmit == 2
-        if alamouti:
-            np.negative(rows[:, 0, 0], out=rows[:, 0, 2])
-        if self.bits_per_symbol == 2:
-            turned = rows[:, 0, 1::-1] if alamouti else rows[:, 0]
-            np.copyto(rows[:, 1, : turned.shape[1], 1], turned[:, :, 0])
-            np.negative(turned[:, :, 1], out=rows[:, 1, : turned.shape[1], 0])
-            if alamouti:
-                np.negative(rows[:, 1, 0], out=rows[:, 1, 2])
-
-    def _window(self, rows: SingleArray) -> SingleArray:
-        """G as a view of its rows: [receiver, part of s, symbol, (time,) part of y, block]."""
-        if self.scheme.transmit == 1:
-            return rows[:, :, 0]
-        rx, parts, _, _, n = rows.shape
-        r, q, slot, c, b = rows.strides
-        return as_strided(rows, (rx, parts, 2, 2, 2, n), (r, q, slot, slot, c, b))
-
-    def _transmit(self) -> None:
-        received = self._received
-        if self.scheme.transmit == 1:
-            if self._moves:
-                for t, matrix in enumerate(self._matrices):
-                    np.einsum("rqcn,qn->rcn", matrix, self._symbol[:, t], out=received[:, t])
-            else:
-                np.einsum("rqcn,qtn->rtcn", self._matrices[0], self._symbol, out=received)
-        elif self._moves:
-            for t, matrix in enumerate(self._matrices):
-                np.einsum("rqmcn,qmn->rcn", matrix[:, :, :, t], self._symbol, out=received[:, t])
-        else:
-            np.einsum("rqmtcn,qmn->rtcn", self._matrices[0], self._symbol, out=received)
-        np.add(received, self._noise, out=received)
-
-    def _combine(self) -> None:
-        form = "rqcn,rtcn->qtn" if self.scheme.transmit == 1 else "rqmtcn,rtcn->qmn"
-        np.einsum(form, self._matrices[0], self._received, out=self._estimated)
-
-    def _compare(self) -> tuple[int, int]:
-        np.less(self._estimated, 0, out=self._decided)
-        np.not_equal(self._decided, self._sent, out=self._wrong)
-        errors = int(np.count_nonzero(self._wrong))
-        if not errors:
-            return 0, 0
-        octets = self._wrong.view(np.uint8).reshape(-1, self._blocks)
-        np.add.reduce(octets, axis=0, dtype=np.uint8, out=self._count)
-        np.copyto(self._squares, self._count)
-        return errors, int(np.dot(self._squares, self._squares))
+        return int(errors), int(squares)
 
     def last(self) -> dict[str, Any]:
-        """What the last step drew and decided, for a check by other means.
+        """What was drawn and decided for the last `LANES` blocks, for a check by other means.
 
         Returns
         -------
@@ -250,22 +123,172 @@ class DiversityLink:
             ``channel`` complex [time, receiver, transmitter, block]; ``noise`` complex
             [receiver, time, block], its power the mean of ``N_t / eb_n0``.
         """
-        tx = self.scheme.transmit
-        channels = [_complex(rows[:, 0, :tx]) for rows in self._rows]
+        parts = self.bits_per_symbol
         return {
-            "sent": self._by_symbol(self._sent),
-            "decided": self._by_symbol(self._decided),
-            "channel": np.stack([channels[0], channels[-1]]),
+            "sent": self._sent[:, :parts] < 0,
+            "decided": self._sums[:, :parts] < 0,
+            "channel": _complex(self._channel[[0, -1]]),
             "noise": _complex(self._noise),
         }
 
-    def _by_symbol(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        parts: NDArray[np.bool_] = rows.transpose(1, 0, 2).copy()
-        if self.scheme.transmit == 2 and self.bits_per_symbol == 2:
-            parts[:, 1] = parts[::-1, 1].copy()  # s ends with Im x2, Im x1
-        return parts
+
+@compiled
+def _simulate(
+    tiles: int,
+    states: WordArray,
+    bits_per_symbol: int,
+    powers: tuple[np.float32, np.float32, np.float32],
+    channel: SingleArray,
+    noise: SingleArray,
+    sent: SingleArray,
+    sums: SingleArray,
+) -> tuple[int, int]:
+    """Errors of some tiles, and the sum over code blocks of their squares.
+
+    Parameters
+    ----------
+    tiles
+        Times `LANES` code blocks.
+    states : uint32 [4, lanes]
+        Generators, carried on.
+    bits_per_symbol
+        1 or 2.
+    powers
+        Correlation of the channel between both times; powers of what is new at the second, and of
+        the noise, times -1.
+    channel : float32 [time, rx, tx, part, lanes]
+        One time if it is constant.
+    noise : float32 [rx, time, part, lanes]
+    sent : float32 [symbol, part, lanes]
+        +-1; an imaginary part of BPSK is 0.
+    sums : float32 [symbol, part, lanes]
+        What the combiner makes of them. All four: results, of the last tile.
+    """
+    correlation, innovation, noise_power = powers
+    _, receive, transmit, _, lanes = channel.shape
+    word = np.empty(lanes, dtype=np.uint32)
+    uniform, mantissa = np.empty(lanes, dtype=np.float32), np.empty(lanes, dtype=np.float32)
+    buffers = uniform, uniform.view(np.int32), mantissa, mantissa.view(np.int32)
+    unit = np.float32(-1.0)
+    moves = channel.shape[0] == 2
+    now, later = channel[0], channel[-1]
+    errors, squares = 0, 0
+    for _ in range(tiles):
+        draw_words(states, word)
+        _draw_symbols(word, bits_per_symbol, sent)
+        for r in range(receive):
+            for a in range(transmit):
+                draw_words(states, word)
+                normal_deviates(word, unit, *buffers, now[r, a])
+                if moves:
+                    draw_words(states, word)
+                    normal_deviates(word, innovation, *buffers, later[r, a])
+                    _move(now[r, a], correlation, later[r, a])
+            for time in range(2):
+                draw_words(states, word)
+                normal_deviates(word, noise_power, *buffers, noise[r, time])
+        sums[:] = np.float32(0.0)
+        for r in range(receive):
+            if transmit == 1:
+                for time in range(2):
+                    _single(
+                        now[r, 0],
+                        channel[time * moves, r, 0],
+                        noise[r, time],
+                        sent[time],
+                        sums[time],
+                    )
+            else:
+                _alamouti(now[r], later[r], noise[r], sent, sums)
+        more, more_squares = _compare(bits_per_symbol, sent, sums)
+        errors += more
+        squares += more_squares
+    return errors, squares
+
+
+@compiled
+def _draw_symbols(word: WordArray, bits_per_symbol: int, sent: SingleArray) -> None:
+    """Parts +-1 [symbol, part, lanes] by the high bits of words."""
+    for symbol in range(2):
+        for part in range(bits_per_symbol):
+            place = np.uint32(31 - 2 * symbol - part)
+            row = sent[symbol, part]
+            for i in range(len(word)):
+                bit = np.int32((word[i] >> place) & _ONE)
+                row[i] = np.float32(np.int32(np.int32(1) - np.int32(bit << np.int32(1))))
+
+
+@compiled
+def _move(now: SingleArray, correlation: np.float32, later: SingleArray) -> None:
+    """Add to what is new at the second time what has stayed of the first; [part, lanes]."""
+    for part in range(2):
+        before, after = now[part], later[part]
+        for i in range(len(before)):
+            after[i] += correlation * before[i]
+
+
+@compiled
+def _single(
+    known: SingleArray,
+    channel: SingleArray,
+    noise: SingleArray,
+    sent: SingleArray,
+    sums: SingleArray,
+) -> None:
+    """One transmitter: received, and combined with the known channel; all [part, lanes]."""
+    for i in range(sent.shape[1]):
+        real = channel[0, i] * sent[0, i] - channel[1, i] * sent[1, i] + noise[0, i]
+        imag = channel[0, i] * sent[1, i] + channel[1, i] * sent[0, i] + noise[1, i]
+        sums[0, i] += known[0, i] * real + known[1, i] * imag
+        sums[1, i] += known[0, i] * imag - known[1, i] * real
+
+
+@compiled
+def _alamouti(
+    now: SingleArray, later: SingleArray, noise: SingleArray, sent: SingleArray, sums: SingleArray
+) -> None:
+    """Two transmitters and one receiver, eqs 1 to 8.
+
+    Parameters
+    ----------
+    now, later : float32 [tx, part, lanes]
+        Channel at both times; the combiner knows the first.
+    noise : float32 [time, part, lanes]
+    sent, sums : float32 [symbol, part, lanes]
+        Sums are added to.
+    """
+    for i in range(sent.shape[2]):
+        a1, b1, a2, b2 = sent[0, 0, i], sent[0, 1, i], sent[1, 0, i], sent[1, 1, i]
+        p1, q1, p2, q2 = now[0, 0, i], now[0, 1, i], now[1, 0, i], now[1, 1, i]
+        r1, s1, r2, s2 = later[0, 0, i], later[0, 1, i], later[1, 0, i], later[1, 1, i]
+        # y1 = h1 x1 + h2 x2 + z1; y2 = -h1 x2* + h2 x1* + z2
+        y1 = p1 * a1 - q1 * b1 + p2 * a2 - q2 * b2 + noise[0, 0, i]
+        y1_imag = p1 * b1 + q1 * a1 + p2 * b2 + q2 * a2 + noise[0, 1, i]
+        y2 = r2 * a1 + s2 * b1 - r1 * a2 - s1 * b2 + noise[1, 0, i]
+        y2_imag = s2 * a1 - r2 * b1 - s1 * a2 + r1 * b2 + noise[1, 1, i]
+        # x1 = h1* y1 + h2 y2*; x2 = h2* y1 - h1 y2*
+        sums[0, 0, i] += p1 * y1 + q1 * y1_imag + p2 * y2 + q2 * y2_imag
+        sums[0, 1, i] += p1 * y1_imag - q1 * y1 + q2 * y2 - p2 * y2_imag
+        sums[1, 0, i] += p2 * y1 + q2 * y1_imag - p1 * y2 - q1 * y2_imag
+        sums[1, 1, i] += p2 * y1_imag - q2 * y1 - q1 * y2 + p1 * y2_imag
+
+
+@compiled
+def _compare(bits_per_symbol: int, sent: SingleArray, sums: SingleArray) -> tuple[int, int]:
+    """Wrong bits, and the sum over code blocks of the square of their number."""
+    errors, squares = 0, 0
+    nothing = np.float32(0.0)
+    for i in range(sent.shape[2]):
+        wrong = np.int32((sums[0, 0, i] < nothing) != (sent[0, 0, i] < nothing))
+        wrong += np.int32((sums[1, 0, i] < nothing) != (sent[1, 0, i] < nothing))
+        if bits_per_symbol == 2:
+            wrong += np.int32((sums[0, 1, i] < nothing) != (sent[0, 1, i] < nothing))
+            wrong += np.int32((sums[1, 1, i] < nothing) != (sent[1, 1, i] < nothing))
+        errors += wrong
+        squares += wrong * wrong
+    return errors, squares
 
 
 def _complex(parts: SingleArray) -> ComplexArray:
-    """[..., 2, block] to complex [..., block]."""
+    """[..., part, block] to complex [..., block]."""
     return parts[..., 0, :].astype(np.float64) + 1j * parts[..., 1, :].astype(np.float64)

@@ -1,0 +1,170 @@
+"""Delivery within a process: who gets what, in which order, and what it costs to serialise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rail_msgs_py.delivery import LocalDelivery, LocalReader, ViewDecoder, serialised, view_reader
+
+
+class Counted:
+    """A view that counts how often it is serialised."""
+
+    def __init__(self, stamp_ns: int = 0) -> None:
+        self.stamp_ns = stamp_ns
+        self.serialisations = 0
+
+    def to_cdr(self) -> bytes:
+        self.serialisations += 1
+        return b"view"
+
+
+class Tasks:
+    """An executor that runs nothing until it is asked to."""
+
+    def __init__(self) -> None:
+        self.waiting: list[Callable[[], None]] = []
+
+    def create_task(self, task: Callable[[], None]) -> None:
+        self.waiting.append(task)
+
+
+@pytest.fixture
+def delivery() -> LocalDelivery:
+    return LocalDelivery()
+
+
+def reader(
+    node: object,
+    take_raw: Callable[[bytes], None],
+    take_view: Callable[[Any], None] | None = None,
+    fail: Callable[[Exception], None] | None = None,
+) -> LocalReader:
+    """Reader that lets nothing go wrong unseen."""
+
+    def failed(error: Exception) -> None:
+        raise AssertionError from error
+
+    return LocalReader(node, fail or failed, take_raw, take_view)
+
+
+def never() -> None:
+    raise AssertionError("nobody outside sends to it")
+
+
+def test_readers_get_a_message_in_the_order_they_came(delivery: LocalDelivery) -> None:
+    got: list[tuple[str, bytes]] = []
+    for name in ("b", "a", "c"):
+        delivery.read("/t", reader(name, lambda raw, n=name: got.append((n, raw))), never)
+    line = delivery.line("/t")
+    delivery.put(line, b"1", b"1")
+    delivery.put(line, b"2", b"2")
+    assert not got  # the sender's callback returns first
+    delivery.run()
+    assert got == [(name, raw) for raw in (b"1", b"2") for name in ("b", "a", "c")]
+
+
+def test_a_view_travels_as_it_is_and_is_serialised_once_for_all(delivery: LocalDelivery) -> None:
+    views: list[Any] = []
+    raws: list[bytes] = []
+    for each in (
+        reader("x", raws.append, views.append),
+        reader("y", raws.append),
+        reader("z", raws.append),
+    ):
+        delivery.read("/t", each, never)
+    view = Counted()
+    delivery.put(delivery.line("/t"), view, None)
+    delivery.run()
+    assert views == [view]
+    assert raws == [b"view", b"view"]
+    assert view.serialisations == 1
+    delivery.put(delivery.line("/t"), view, b"told before")
+    delivery.run()
+    assert view.serialisations == 1
+    assert raws[2:] == [b"told before"] * 2
+
+
+def test_what_a_reader_sends_comes_after_what_waits(delivery: LocalDelivery) -> None:
+    order: list[bytes] = []
+
+    def first(raw: bytes) -> None:
+        order.append(raw)
+        delivery.put(delivery.line("/answer"), b"answer", b"answer")
+        delivery.run()  # as a callback would that is called by the executor: no recursion
+        order.append(b"returned")
+
+    delivery.read("/t", reader("x", first), never)
+    delivery.read("/t", reader("y", order.append), never)
+    delivery.read("/answer", reader("x", order.append), never)
+    delivery.put(delivery.line("/t"), b"asked", b"asked")
+    delivery.run()
+    assert order == [b"asked", b"returned", b"asked", b"answer"]
+
+
+def test_only_what_nobody_here_sends_is_subscribed_to(delivery: LocalDelivery) -> None:
+    subscribed: list[str] = []
+    for name in ("/here", "/outside"):
+        one = reader("x", lambda _: None)
+        delivery.read(name, one, lambda n=name: subscribed.append(n))
+    delivery.line("/here").writers += 1
+    delivery.settle(Tasks())
+    assert subscribed == ["/outside"]
+
+
+def test_a_node_that_is_taken_out_gets_nothing_any_longer(delivery: LocalDelivery) -> None:
+    got: list[str] = []
+    for name in ("dead", "alive"):
+        delivery.read("/t", reader(name, lambda _, n=name: got.append(n)), never)
+    delivery.put(delivery.line("/t"), b"under way", b"under way")
+    delivery.remove("dead")
+    delivery.put(delivery.line("/t"), b"later", b"later")
+    delivery.run()
+    assert got == ["alive", "alive"]
+
+
+def test_endless_work_is_done_in_turns(delivery: LocalDelivery) -> None:
+    tasks = Tasks()
+    delivery.settle(tasks)
+    seen = 0
+
+    def again(raw: bytes) -> None:
+        nonlocal seen
+        seen += 1
+        delivery.put(delivery.line("/t"), raw, raw)
+
+    delivery.read("/t", reader("x", again), never)
+    delivery.put(delivery.line("/t"), b"", b"")
+    delivery.run()
+    assert tasks.waiting == [delivery.run]  # the executor has its turn, and comes back
+    before = seen
+    tasks.waiting.pop()()
+    assert seen > before
+
+
+def test_a_reader_that_raises_does_not_stop_the_others(delivery: LocalDelivery) -> None:
+    got: list[bytes] = []
+    failed: list[Exception] = []
+
+    def broken(raw: bytes) -> None:
+        raise RuntimeError(raw)
+
+    delivery.read("/t", reader("x", broken, fail=failed.append), never)
+    delivery.read("/t", reader("y", got.append), never)
+    delivery.put(delivery.line("/t"), b"1", b"1")
+    delivery.run()
+    assert [str(error) for error in failed] == ["b'1'"]
+    assert got == [b"1"]
+
+
+def test_decoders_say_whether_they_take_views() -> None:
+    of_view = view_reader(ViewDecoder(lambda raw: (1, raw), lambda view: (view.stamp_ns, view)))
+    assert of_view is not None
+    view = Counted(7)
+    assert of_view(view) == (7, view)
+    assert view_reader(lambda raw: (0, raw)) is None
+    assert serialised(view) == b"view"
+    assert serialised(b"raw") == b"raw"

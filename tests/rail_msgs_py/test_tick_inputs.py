@@ -59,9 +59,6 @@ class Recorder:
     def every(self, period_s: float, callback: Callable[[], None]) -> None:
         self._timers.append(callback)
 
-    def at_tick(self, stamp_ns: int) -> None:
-        """Take the time; the health of a node is tested elsewhere."""
-
     def steady_s(self) -> float:
         return self.now_s
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .conftest import Listener, Rail
 
 pytestmark = pytest.mark.system
+_RUN = ("jammed_channel", "--duration", 30)
 
 
 def test_a_report_that_stands_still_for_a_hundred_ticks_misses_none(
@@ -26,7 +27,7 @@ def test_a_report_that_stands_still_for_a_hundred_ticks_misses_none(
 ) -> None:
     path = rail.directory / "report.json"
     clock, observed = listener.listen(CLOCK), listener.listen(OBSERVED)
-    run = rail.start("run", "branch", "--duration", 40, "--processes", "site", "--report", path)
+    run = rail.start(*("run", *_RUN), "--processes", "site", "--report", path)
     listener.until(lambda: len(observed) > 1)
     os.kill(run.pid, signal.SIGSTOP)
     stopped = len(clock)
@@ -34,10 +35,12 @@ def test_a_report_that_stands_still_for_a_hundred_ticks_misses_none(
     os.kill(run.pid, signal.SIGCONT)
     assert rail.finish(run) == 0
     report = json.loads(path.read_text())
-    assert report["complete"] and report["ticks"] == 400
+    assert report["complete"] and report["ticks"] == 300
     assert report["missing_ticks"] == 0 and not report["failures"]
-    whole = rail.report("branch", "--duration", 40, "--processes", "one")
+    whole = rail.report(*_RUN, "--processes", "one")
     assert report["digest"] == whole["digest"]
+    # What nodes said of their health as well, each change once.
+    assert report["events"] == whole["events"] and len(whole["events"]) >= 4
 
 
 def test_who_joins_late_gets_the_newest_estimate_first_and_soon_the_health_of_all(

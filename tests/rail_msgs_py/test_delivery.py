@@ -7,7 +7,14 @@ from typing import Any
 
 import pytest
 
-from rail_msgs_py.delivery import LocalDelivery, LocalReader, ViewDecoder, serialised, view_reader
+from rail_msgs_py.delivery import (
+    Listener,
+    LocalDelivery,
+    LocalReader,
+    ViewDecoder,
+    serialised,
+    view_reader,
+)
 
 
 class Counted:
@@ -158,6 +165,31 @@ def test_a_reader_that_raises_does_not_stop_the_others(delivery: LocalDelivery) 
     delivery.run()
     assert [str(error) for error in failed] == ["b'1'"]
     assert got == [b"1"]
+
+
+def test_a_process_hears_a_topic_of_many_once_for_all_its_nodes(delivery: LocalDelivery) -> None:
+    heard: list[tuple[str, str]] = []
+    ears: list[tuple[str, Callable[[Any], None]]] = []
+    for name in ("first", "second", "third"):
+        delivery.listen(
+            "/failed",
+            Listener(
+                name,
+                lambda hear, n=name: ears.append((n, hear)),
+                lambda message, n=name: heard.append((n, message)),
+            ),
+        )
+    assert [name for name, _ in ears] == ["first"]
+    ears[0][1]("one")
+    assert heard == [(name, "one") for name in ("first", "second", "third")]
+    # One that does not have the subscription leaves, then the one that has it.
+    delivery.remove("second")
+    assert len(ears) == 1
+    delivery.remove("first")
+    assert [name for name, _ in ears] == ["first", "third"]
+    heard.clear()
+    ears[1][1]("two")
+    assert heard == [("third", "two")]
 
 
 def test_decoders_say_whether_they_take_views() -> None:

@@ -19,7 +19,7 @@ from rclpy.qos import DurabilityPolicy
 from rail_msgs_py.topics.tick import CLOCK, NO_READER, NO_SENDER
 from rail_msgs_py.topics.topic import Topic
 
-from .delivery import Decoder, LocalDelivery, LocalReader, Send, view_reader
+from .delivery import Decoder, Listener, LocalDelivery, LocalReader, Send, view_reader
 from .health import HealthMixin
 from .parameters import overrides
 from .publisher import CorridorPublisher
@@ -201,8 +201,8 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         if delivery is None:
             subscribe(callback)
         else:
-            safely = self._safely(callback)
-            delivery.listen(self.resolve_topic_name(name), self, subscribe, safely)
+            listener = Listener(self, subscribe, self._safely(callback))
+            delivery.listen(self.resolve_topic_name(name), listener)
 
     def guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
         """Callback for the executor; what it sends within the process is handed over after it.
@@ -210,15 +210,13 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         Exceptions are told on ``/diagnostics`` instead of stopping the process. The tick's timeout
         then treats the node as silent, as it would a broken device.
         """
-        delivery = self._delivery
+        safe, delivery = self._safely(callback), self._delivery
+        if delivery is None:
+            return safe
 
         def run(*arguments: Any) -> None:
-            try:
-                callback(*arguments)
-            except Exception as error:
-                self._failed_callback(error)
-            if delivery is not None:
-                delivery.run()
+            safe(*arguments)
+            delivery.run()
 
         return run
 

@@ -122,6 +122,16 @@ def test_only_what_nobody_here_sends_is_subscribed_to(delivery: LocalDelivery) -
     assert subscribed == ["/outside"]
 
 
+def test_who_comes_after_the_others_is_subscribed_at_once(delivery: LocalDelivery) -> None:
+    subscribed: list[str] = []
+    delivery.line("/here").writers += 1
+    delivery.settle(Tasks())
+    for name in ("/here", "/outside"):
+        one = reader("x", lambda _: None)
+        delivery.read(name, one, lambda n=name: subscribed.append(n))
+    assert subscribed == ["/outside"]
+
+
 def test_a_node_that_is_taken_out_gets_nothing_any_longer(delivery: LocalDelivery) -> None:
     got: list[str] = []
     for name in ("dead", "alive"):
@@ -135,6 +145,7 @@ def test_a_node_that_is_taken_out_gets_nothing_any_longer(delivery: LocalDeliver
 
 def test_endless_work_is_done_in_turns(delivery: LocalDelivery) -> None:
     tasks = Tasks()
+    delivery.line("/t").writers += 1
     delivery.settle(tasks)
     seen = 0
 

@@ -168,7 +168,10 @@ class LocalDelivery:
         """Add a reader; ``subscribe`` connects it to the outside if nobody here sends to it."""
         line = self.line(name)
         line.readers.append(reader)
-        self._unsettled.append((line, subscribe))
+        if self._executor is None:
+            self._unsettled.append((line, subscribe))
+        elif not line.writers:
+            subscribe()
         return line
 
     def listen(self, name: str, listener: Listener) -> None:

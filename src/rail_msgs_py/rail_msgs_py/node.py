@@ -68,6 +68,10 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         """Delivery to the other nodes of the process, if it has one."""
         return getattr(self.context, "delivery", None)
 
+    def _delivery_of(self, topic: Topic) -> LocalDelivery | None:
+        """Delivery of a topic that only one node sends."""
+        return None if topic.shared else self._delivery
+
     def name_of(self, topic: Topic, **parts: object) -> str:
         """Name of a topic as this node asks for it, before its remapping rules."""
         return topic.name(**parts)
@@ -78,7 +82,7 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         if publisher.topic_name in getattr(self.context, "report_reads", ()):
             self._await_report(publisher)
         tap = getattr(self.context, "tap", None)
-        return CorridorPublisher(topic, publisher, tap, self._delivery)
+        return CorridorPublisher(topic, publisher, tap, self._delivery_of(topic))
 
     def _await_report(self, publisher: Any) -> None:
         """Wait until what is published is heard by the report, as by all readers known here."""
@@ -175,7 +179,7 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         take_view: Callable[[Any], None] | None,
         parts: Mapping[str, object],
     ) -> None:
-        asked, delivery = self.name_of(topic, **parts), self._delivery
+        asked, delivery = self.name_of(topic, **parts), self._delivery_of(topic)
         name = self.resolve_topic_name(asked)
 
         def subscribe() -> None:

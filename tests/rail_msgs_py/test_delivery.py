@@ -7,7 +7,14 @@ from typing import Any
 
 import pytest
 
-from rail_msgs_py.delivery import LocalDelivery, LocalReader, ViewDecoder, serialised, view_reader
+from rail_msgs_py.delivery import (
+    Listener,
+    LocalDelivery,
+    LocalReader,
+    ViewDecoder,
+    serialised,
+    view_reader,
+)
 
 
 class Counted:
@@ -115,6 +122,16 @@ def test_only_what_nobody_here_sends_is_subscribed_to(delivery: LocalDelivery) -
     assert subscribed == ["/outside"]
 
 
+def test_who_comes_after_the_others_is_subscribed_at_once(delivery: LocalDelivery) -> None:
+    subscribed: list[str] = []
+    delivery.line("/here").writers += 1
+    delivery.settle(Tasks())
+    for name in ("/here", "/outside"):
+        one = reader("x", lambda _: None)
+        delivery.read(name, one, lambda n=name: subscribed.append(n))
+    assert subscribed == ["/outside"]
+
+
 def test_a_node_that_is_taken_out_gets_nothing_any_longer(delivery: LocalDelivery) -> None:
     got: list[str] = []
     for name in ("dead", "alive"):
@@ -128,6 +145,7 @@ def test_a_node_that_is_taken_out_gets_nothing_any_longer(delivery: LocalDeliver
 
 def test_endless_work_is_done_in_turns(delivery: LocalDelivery) -> None:
     tasks = Tasks()
+    delivery.line("/t").writers += 1
     delivery.settle(tasks)
     seen = 0
 
@@ -158,6 +176,31 @@ def test_a_reader_that_raises_does_not_stop_the_others(delivery: LocalDelivery) 
     delivery.run()
     assert [str(error) for error in failed] == ["b'1'"]
     assert got == [b"1"]
+
+
+def test_a_process_hears_a_topic_of_many_once_for_all_its_nodes(delivery: LocalDelivery) -> None:
+    heard: list[tuple[str, str]] = []
+    ears: list[tuple[str, Callable[[Any], None]]] = []
+    for name in ("first", "second", "third"):
+        delivery.listen(
+            "/failed",
+            Listener(
+                name,
+                lambda hear, n=name: ears.append((n, hear)),
+                lambda message, n=name: heard.append((n, message)),
+            ),
+        )
+    assert [name for name, _ in ears] == ["first"]
+    ears[0][1]("one")
+    assert heard == [(name, "one") for name in ("first", "second", "third")]
+    # One that does not have the subscription leaves, then the one that has it.
+    delivery.remove("second")
+    assert len(ears) == 1
+    delivery.remove("first")
+    assert [name for name, _ in ears] == ["first", "third"]
+    heard.clear()
+    ears[1][1]("two")
+    assert heard == [("third", "two")]
 
 
 def test_decoders_say_whether_they_take_views() -> None:

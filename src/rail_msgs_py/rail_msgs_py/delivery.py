@@ -103,27 +103,50 @@ class Line:
     readers: list[LocalReader] = field(default_factory=list)
 
 
-@dataclass(eq=False)
-class Ear:
-    """One subscription for all nodes of a process that listen to a topic.
-
-    Many nodes publish on it: that each of them heard each of the others by itself would take the
-    square of their number in memory and in time.
+@dataclass(frozen=True, eq=False)
+class Listener:
+    """A node that listens to a topic of many publishers.
 
     Parameters
     ----------
-    owner : node
-        Node whose subscription it is.
-    listeners : list of (node, subscribe, callback)
+    node : node
+    subscribe : callable of a callback
+        Makes its subscription, should it be the one that has it.
+    take : callable
+        Takes messages.
     """
 
-    owner: Any
-    listeners: list[tuple[Any, Callable[[Callable[[Any], None]], None], Callable[[Any], None]]]
+    node: Any
+    subscribe: Callable[[Callable[[Any], None]], None]
+    take: Callable[[Any], None]
 
-    def hear(self, message: Any) -> None:
-        """Tell all listeners."""
-        for _, _, callback in tuple(self.listeners):
-            callback(message)
+
+class Ear:
+    """The one subscription of a process to a topic, that of the first of its listeners.
+
+    Many nodes publish on it: that each of them heard each of the others by itself would take the
+    square of their number in memory and in time.
+    """
+
+    def __init__(self) -> None:
+        self._listeners: list[Listener] = []
+
+    def add(self, listener: Listener) -> None:
+        """Tell one more listener."""
+        self._listeners.append(listener)
+        if len(self._listeners) == 1:
+            listener.subscribe(self._hear)
+
+    def remove(self, node: Any) -> None:
+        """Tell a node no longer; if the subscription was its own, the next one makes another."""
+        first = self._listeners[:1]
+        self._listeners = [each for each in self._listeners if each.node is not node]
+        if self._listeners and self._listeners[:1] != first:
+            self._listeners[0].subscribe(self._hear)
+
+    def _hear(self, message: Any) -> None:
+        for listener in self._listeners:
+            listener.take(message)
 
 
 class LocalDelivery:
@@ -145,28 +168,15 @@ class LocalDelivery:
         """Add a reader; ``subscribe`` connects it to the outside if nobody here sends to it."""
         line = self.line(name)
         line.readers.append(reader)
-        self._unsettled.append((line, subscribe))
+        if self._executor is None:
+            self._unsettled.append((line, subscribe))
+        elif not line.writers:
+            subscribe()
         return line
 
-    def listen(
-        self,
-        name: str,
-        node: Any,
-        subscribe: Callable[[Callable[[Any], None]], None],
-        callback: Callable[[Any], None],
-    ) -> None:
-        """Listen to a topic of many publishers, by the one subscription of the process to it.
-
-        Parameters
-        ----------
-        subscribe : callable of a callback
-            Makes the subscription, should the node have to be the one that has it.
-        """
-        ear = self._ears.get(name)
-        if ear is None:
-            ear = self._ears[name] = Ear(node, [])
-            subscribe(ear.hear)
-        ear.listeners.append((node, subscribe, callback))
+    def listen(self, name: str, listener: Listener) -> None:
+        """Listen to a topic of many publishers, by the one subscription of the process to it."""
+        self._ears.setdefault(name, Ear()).add(listener)
 
     def settle(self, executor: Any) -> None:
         """All nodes are made: subscribe outside to what nobody here sends.
@@ -205,15 +215,8 @@ class LocalDelivery:
 
     def remove(self, node: Any) -> None:
         """Hand nothing any longer to a node."""
-        for name, ear in list(self._ears.items()):
-            ear.listeners = [each for each in ear.listeners if each[0] is not node]
-            if ear.owner is not node:
-                continue
-            if not ear.listeners:
-                del self._ears[name]
-                continue
-            ear.owner, subscribe, _ = ear.listeners[0]
-            subscribe(ear.hear)
+        for ear in self._ears.values():
+            ear.remove(node)
         for line in self._lines.values():
             line.readers = [reader for reader in line.readers if reader.node is not node]
         waiting = [entry for entry in self._queue if entry[2].node is not node]

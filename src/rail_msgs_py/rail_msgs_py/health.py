@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
 from rail_msgs_py.topics.tick import DIAGNOSTICS
 
+from .mixin import RosNode
 from .stamps import NANOSECONDS, clock_to_cdr
 
 # Of a serialised DiagnosticArray: what stands before the name of its frame.
 _STAMP_BYTES = 12
 
 
-# To the type checker the mixin has what rclpy's nodes have; at run time it stands before them.
-_RosNode: Any = Node if TYPE_CHECKING else object
-
-
-class HealthMixin(_RosNode):  # type: ignore[misc]
+class HealthMixin(RosNode):  # type: ignore[misc]
     """Tells the health of a node, by aspects of it."""
 
     def init_health(self) -> None:

@@ -19,7 +19,7 @@ from rclpy.qos import DurabilityPolicy
 from rail_msgs_py.topics.tick import CLOCK, NO_READER, NO_SENDER
 from rail_msgs_py.topics.topic import Topic
 
-from .delivery import Decoder, LocalDelivery, LocalReader, Send, view_reader
+from .delivery import Decoder, Listener, LocalDelivery, LocalReader, Send, view_reader
 from .health import HealthMixin
 from .parameters import overrides
 from .publisher import CorridorPublisher
@@ -68,6 +68,10 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         """Delivery to the other nodes of the process, if it has one."""
         return getattr(self.context, "delivery", None)
 
+    def _delivery_of(self, topic: Topic) -> LocalDelivery | None:
+        """Delivery of a topic that only one node sends."""
+        return None if topic.shared else self._delivery
+
     def name_of(self, topic: Topic, **parts: object) -> str:
         """Name of a topic as this node asks for it, before its remapping rules."""
         return topic.name(**parts)
@@ -78,7 +82,7 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         if publisher.topic_name in getattr(self.context, "report_reads", ()):
             self._await_report(publisher)
         tap = getattr(self.context, "tap", None)
-        return CorridorPublisher(topic, publisher, tap, self._delivery)
+        return CorridorPublisher(topic, publisher, tap, self._delivery_of(topic))
 
     def _await_report(self, publisher: Any) -> None:
         """Wait until what is published is heard by the report, as by all readers known here."""
@@ -175,7 +179,7 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         take_view: Callable[[Any], None] | None,
         parts: Mapping[str, object],
     ) -> None:
-        asked, delivery = self.name_of(topic, **parts), self._delivery
+        asked, delivery = self.name_of(topic, **parts), self._delivery_of(topic)
         name = self.resolve_topic_name(asked)
 
         def subscribe() -> None:
@@ -201,8 +205,8 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         if delivery is None:
             subscribe(callback)
         else:
-            safely = self._safely(callback)
-            delivery.listen(self.resolve_topic_name(name), self, subscribe, safely)
+            listener = Listener(self, subscribe, self._safely(callback))
+            delivery.listen(self.resolve_topic_name(name), listener)
 
     def guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
         """Callback for the executor; what it sends within the process is handed over after it.
@@ -210,15 +214,13 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         Exceptions are told on ``/diagnostics`` instead of stopping the process. The tick's timeout
         then treats the node as silent, as it would a broken device.
         """
-        delivery = self._delivery
+        safe, delivery = self._safely(callback), self._delivery
+        if delivery is None:
+            return safe
 
         def run(*arguments: Any) -> None:
-            try:
-                callback(*arguments)
-            except Exception as error:
-                self._failed_callback(error)
-            if delivery is not None:
-                delivery.run()
+            safe(*arguments)
+            delivery.run()
 
         return run
 

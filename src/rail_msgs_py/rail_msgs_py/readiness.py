@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from rclpy.node import Node
 from std_msgs.msg import String
 
 from rail_msgs_py.topics.tick import READY, WAITING
+
+from .mixin import RosNode
 
 READY_POLL_S = 0.05
 #: Wall time without a new connection after which a node says what it waits for.
@@ -34,11 +35,7 @@ class Connection(NamedTuple):
     lacks: str = ""
 
 
-# To the type checker the mixin has what rclpy's nodes have; at run time it stands before them.
-_RosNode: Any = Node if TYPE_CHECKING else object
-
-
-class ReadinessMixin(_RosNode):  # type: ignore[misc]
+class ReadinessMixin(RosNode):  # type: ignore[misc]
     """Waits for connections, and says so."""
 
     def init_readiness(self) -> None:

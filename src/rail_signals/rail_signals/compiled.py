@@ -19,9 +19,6 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
-#: Beside the machine code: with which types the first call was.
-_CALLED_AS = "{}.called_as"
-
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -50,7 +47,6 @@ class Kernel:
         assert isinstance(function, FunctionType)
         self.py_func = function
         self._run: Callable[..., Any] = self._first_run
-        self._name = function.__qualname__
         functools.update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -58,15 +54,14 @@ class Kernel:
         return self._run(*arguments)
 
     def _first_run(self, *arguments: Any) -> Any:
-        code = self.machine_code()
-        answer = code(*arguments)
-        note = self._folder / _CALLED_AS.format(self._name)
-        if not note.is_file():
+        self._run = self.machine_code
+        answer = self._run(*arguments)
+        if not self._called_as.is_file():
             import numba
 
             signature = tuple(numba.typeof(argument) for argument in arguments)
             with contextlib.suppress(OSError):
-                note.write_bytes(pickle.dumps(signature))
+                self._called_as.write_bytes(pickle.dumps(signature))
         return answer
 
     def preload(self) -> bool:
@@ -77,39 +72,38 @@ class Kernel:
         bool
             False if no process has yet called the kernel; then nothing is done.
         """
-        note = self._folder / _CALLED_AS.format(self._name)
-        if not note.is_file():
+        if not self._called_as.is_file():
             return False
-        code: Any = self.machine_code()
+        code: Any = self.machine_code
         try:
-            code.compile(pickle.loads(note.read_bytes()))
+            code.compile(pickle.loads(self._called_as.read_bytes()))
         except (pickle.UnpicklingError, EOFError, AttributeError, ImportError):
-            note.unlink(missing_ok=True)
+            self._called_as.unlink(missing_ok=True)
             return False
         return True
 
+    @functools.cached_property
     def machine_code(self) -> Callable[..., Any]:
         """The function of the compiler, also for the kernels that this one calls."""
-        if self._run != self._first_run:
-            return self._run
         import numba
 
         # The compiler wants to see its own functions behind the names of those that are called.
         function = FunctionType(
             self.py_func.__code__,
             self.py_func.__globals__
-            | {name: kernel.machine_code() for name, kernel in self._called()},
+            | {name: kernel.machine_code for name, kernel in self._called()},
             self.py_func.__name__,
         )
         function.__qualname__ = self.py_func.__qualname__
         # The compiler's own cache does not see a change in a kernel that is called by this one.
         of_user, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(self._folder)
         try:
-            code = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+            code: Callable[..., Any] = numba.njit(cache=True, nogil=True, error_model="numpy")(
+                function
+            )
         finally:
             numba.config.CACHE_DIR = of_user
-        self._run = code
-        return cast("Callable[..., Any]", code)
+        return code
 
     def _called(self) -> Iterator[tuple[str, Kernel]]:
         """Kernels that this one calls, by their names in its module."""
@@ -133,6 +127,11 @@ class Kernel:
             digest.update(Path(path).read_bytes())
         beside = Path(self.py_func.__code__.co_filename).parent / "__pycache__"
         return cache_folder(beside) / f"kernels-{digest.hexdigest()[:16]}"
+
+    @property
+    def _called_as(self) -> Path:
+        """Beside the machine code: with which types the first call was."""
+        return self._folder / f"{self.py_func.__qualname__}.called_as"
 
 
 def preload_kernels() -> int:

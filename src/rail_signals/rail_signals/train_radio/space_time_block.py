@@ -65,11 +65,6 @@ class Scheme:
             raise ValueError(f"receive must be 1 antenna or more, got {self.receive!r}")
 
     @property
-    def antenna_power(self) -> float:
-        """Fraction of the transmit power that each antenna sends."""
-        return 1.0 / self.transmit
-
-    @property
     def diversity(self) -> int:
         """Independent branches that carry each symbol."""
         return self.transmit * self.receive

@@ -16,12 +16,12 @@ from rail_msgs_py.failures import failure
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
-from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, OBSERVED
+from rail_msgs_py.topics.tick import FAILED, OBSERVED
 from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.world import STATE, TRAIN_MARKERS
 from rail_signals.arrays import FloatArray
 
-from .intake import Intake, Reader
+from .intake import Intake
 from .map_markers import train_markers
 
 NAME = REPORT.strip("/")
@@ -37,9 +37,6 @@ class Observer(CorridorNode):
         Called about ten times a second of wall time.
     record : bool
         False where the report is made on another host.
-    alone : bool
-        Whether all nodes of the corridor are in this process. What several processes send on, it
-        has to hear outside, its own part as well.
     """
 
     def __init__(
@@ -49,7 +46,6 @@ class Observer(CorridorNode):
         *,
         context: Any = None,
         record: bool = True,
-        alone: bool = True,
     ) -> None:
         super().__init__(NAME, "/", context=context, services=False)
         self._tick_ns = plan.world.tick_ns
@@ -63,8 +59,6 @@ class Observer(CorridorNode):
         for reader in self.intake.readers:
             if not reader.raw:
                 self.listen(reader.topic, reader.take, **reader.parts)
-            elif record and reader.topic is DIAGNOSTICS and not alone:
-                self._hear_outside(reader)
             elif record:
                 take = self._noting(reader.take) if reader.topic is STATE else reader.take
                 self.stream_in(reader.topic, take, **reader.parts)
@@ -105,13 +99,6 @@ class Observer(CorridorNode):
         message = failure(node, reason, "the launcher", stamp_ns)
         self.intake.take_failed(message)  # it may be the end of the run
         self._failed.publish(message)
-
-    def _hear_outside(self, reader: Reader) -> None:
-        """Subscribe to a topic past the delivery within the process."""
-        receive = self.guarded(reader.take)
-        self.create_subscription(
-            reader.topic.type, reader.name, receive, reader.topic.qos, raw=True
-        )
 
     def _noting(self, take: Callable[[bytes], None]) -> Callable[[bytes], None]:
         """Reader of the truth that notes the wall time, and tells the world how far it has read."""

@@ -209,7 +209,6 @@ class _LaunchedRun:
             self._on_progress,
             context=context,
             record=self._options.only != "onboard",
-            alone=bool(self._here) and not self._options.with_external_nodes,
         )
         here = make_nodes(
             self._here,

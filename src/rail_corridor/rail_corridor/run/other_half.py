@@ -26,7 +26,7 @@ class OtherHalf:
         self.gone = False
 
     def look(self, node: Any) -> bool:
-        """Look, now and then, through the eyes of a node; whether it has been found gone just now."""
+        """Look, now and then, through the eyes of a node: whether it is found gone just now."""
         now_s = node.steady_s()
         if self.gone or now_s - self._looked_s < _LOOK_S:
             return False

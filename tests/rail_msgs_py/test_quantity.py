@@ -36,6 +36,11 @@ CASES = [
     (SPEEDS, (0.0, 360.0), True),
     (SPEEDS, (0.0, 361.0), False),
     (SPEEDS, (), True),
+    (SPEEDS, (math.nan, 1.0), False),
+    (LEVEL, (1e-12, 100.0), True),
+    (LEVEL, (1.0, 0.0), False),
+    (COUNT, (2, 9), False),
+    (LAW, ("linear", "cubic"), False),
 ]
 
 

@@ -56,7 +56,7 @@ class Recorder:
     def publish(self, message: Any) -> None:
         self.failed.append((message.name, message.message))
 
-    def every(self, period_s: float, callback: Callable[[], None]) -> None:
+    def look_every(self, period_s: float, callback: Callable[[], None]) -> None:
         self._timers.append(callback)
 
     def steady_s(self) -> float:

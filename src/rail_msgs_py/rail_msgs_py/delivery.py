@@ -105,7 +105,7 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Listener:
-    """A node that listens to a topic of many publishers.
+    """A node that listens to a topic of many publishers, or to a timer.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Listener:
     subscribe : callable of a callback
         Makes its subscription, should it be the one that has it.
     take : callable
-        Takes messages.
+        Takes messages; of a timer None.
     """
 
     node: Any
@@ -122,7 +122,7 @@ class Listener:
 
 
 class Ear:
-    """The one subscription of a process to a topic, that of the first of its listeners.
+    """The one subscription of a process to a topic, or its one timer, that of its first listener.
 
     Many nodes publish on it: that each of them heard each of the others by itself would take the
     square of their number in memory and in time.
@@ -176,7 +176,7 @@ class LocalDelivery:
         return line
 
     def listen(self, name: str, listener: Listener) -> None:
-        """Listen to a topic of many publishers, by the one subscription of the process to it."""
+        """Listen to a topic of many publishers, or a timer, by the one that the process has."""
         self._ears.setdefault(name, Ear()).add(listener)
 
     def settle(self, executor: Any) -> None:

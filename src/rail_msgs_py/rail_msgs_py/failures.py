@@ -108,7 +108,7 @@ class TickWatch(FailureWatch):
         super().__init__(node, owners, self._drop)
         self._inbox, self._timeout_s, self._advance = inbox, timeout_s, advance
         self._begun_s = float("inf")
-        node.every(WATCH_PERIOD_S, self._check)
+        node.look_every(WATCH_PERIOD_S, self._check)
 
     def begin(self) -> None:
         """Start the clock: a tick is under way."""

@@ -243,6 +243,19 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         """Timer on the steady wall clock."""
         return self.create_timer(period_s, self.guarded(callback), clock=self._steady)
 
+    def look_every(self, period_s: float, check: Callable[[], None]) -> None:
+        """As `every`, for as long as the node lives: by one timer of all nodes of the process."""
+        delivery = self._delivery
+        if delivery is None:
+            self.every(period_s, check)
+            return
+
+        def subscribe(hear: Callable[[Any], None]) -> None:
+            self.every(period_s, lambda: hear(None))
+
+        listener = Listener(self, subscribe, self._safely(lambda _: check()))
+        delivery.listen(f"every {period_s} s", listener)
+
     def steady_s(self) -> float:
         """Steady wall-clock time, that of `every`; without the objects of rclpy around it."""
         return time.monotonic()

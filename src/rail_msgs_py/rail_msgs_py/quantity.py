@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar, cast
 
+import numpy as np
+
 Value_co = TypeVar("Value_co", covariant=True)
 
 #: Default of a quantity that has to be given.
@@ -90,6 +92,8 @@ class Quantity(Generic[Value_co]):
     def refusal(self, value: object) -> str:
         """Why a value cannot be, empty if it can; of an array one number after the other."""
         if isinstance(value, tuple):
+            if self._takes_all(value):
+                return ""
             return next((why for each in value if (why := self.refusal(each))), "")
         if self.choices and value not in self.choices:
             return f"{value} is not one of {', '.join(map(str, self.choices))}"
@@ -100,6 +104,16 @@ class Quantity(Generic[Value_co]):
             return ""
         bracket = "(" if self.low_open else "["
         return f"{value} is not within {bracket}{self.low}, {self.high}] {self.unit}"
+
+    def _takes_all(self, values: tuple[object, ...]) -> bool:
+        """Whether an array is one of numbers that are all within the bounds; quick where it is."""
+        if self.choices or not values:
+            return not values
+        numbers = np.array(values)
+        if numbers.ndim != 1 or numbers.dtype.kind not in "fi":
+            return False
+        above = numbers > self.low if self.low_open else numbers >= self.low
+        return bool(np.all(above & (numbers <= self.high)))
 
 
 def quantity_of(field: dataclasses.Field[Any]) -> Quantity[Any]:

@@ -435,3 +435,6 @@ def test_wrong_tables_bursts_and_windows_are_refused() -> None:
         hear(radio, links, sent={0: [ones(1)]})
     with pytest.raises(ValueError, match=r"\(1, 5\), not \[2"):
         hear(radio, links, sent={0: [Burst(0, np.ones((1, 5)) + 0j)]})
+    for bursts in ([ones(50, 10), ones(0, 10)], [ones(0, 100), ones(99, 10)]):
+        with pytest.raises(ValueError, match="overlap, or are not in their order"):
+            hear(radio, links, sent={0: bursts})

@@ -8,6 +8,7 @@ waits for the service, and finds it (docs/adr/0013).
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from itertools import islice
 from typing import Any, Final
@@ -16,6 +17,9 @@ from rclpy.node import NodeNameNonExistentError
 from rclpy.parameter_service import ParameterService
 
 POLL_S: Final = 0.1
+#: Looking takes longer the more nodes there are: the rest after it is so many times as long.
+_REST: Final = 250
+_LONGEST_REST_S: Final = 1.0
 _OWN_TOOLS: Final = ("/rail_",)
 
 
@@ -38,10 +42,22 @@ class ParameterServicesOnDemand:
         self._order = list(everyone)
         self._asked: set[str] = set()
         self._made: list[ParameterService] = []
+        self._rest_until_s = 0.0
         if self._without:
             self._watcher.every(POLL_S, self._look)
 
     def _look(self) -> None:
+        """Look at the graph, unless that was just done."""
+        begun_s = time.monotonic()
+        if begun_s < self._rest_until_s:
+            return
+        made = len(self._made)
+        self._look_for_clients()
+        if len(self._made) == made:
+            ended_s = time.monotonic()
+            self._rest_until_s = ended_s + min(_REST * (ended_s - begun_s), _LONGEST_REST_S)
+
+    def _look_for_clients(self) -> None:
         for name in {*self._watcher.get_fully_qualified_node_names()} - self._known:
             if name.startswith(_OWN_TOOLS):
                 continue

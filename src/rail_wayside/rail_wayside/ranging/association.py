@@ -53,6 +53,10 @@ class RunningOrder:
             self._ahead[rear, front] = distance_m > 0.0
             self._ahead[front, rear] = distance_m < 0.0
 
+    def known(self) -> list[tuple[int, int]]:
+        """Pairs whose order is known, each pair once."""
+        return [(one, other) for one, other in self._ahead if one < other]
+
     def allows(self, one: int, other: int, distance_m: float | None) -> bool:
         """Whether ``other`` can be that far ahead of ``one`` (negative: behind)."""
         known = self._ahead.get((one, other))
@@ -70,7 +74,8 @@ def associate(
     ----------
     candidates : sequence of TrainCandidate
     distances_m : mapping
-        Distance along the line from one reading to another [m]; None where there is none.
+        Distance along the line from one reading to another [m]; missing or None where there is
+        none.
     order : RunningOrder
 
     Returns

@@ -9,7 +9,7 @@ told is flagged, not guessed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from .association import FOLLOWED_S, RunningOrder, TrainCandidate, associate
@@ -76,6 +76,41 @@ class _ReadingPlace:
     variance_m2: float
 
 
+class _Places:
+    """The readings of one tick; each is compared only with what is in its neighbourhood."""
+
+    def __init__(self, zone_map: ZoneMap, places: Sequence[_ReadingPlace]) -> None:
+        self._map, self.all = zone_map, places
+        self._in_zone: dict[str, list[int]] = {}
+        for number, place in enumerate(places):
+            self._in_zone.setdefault(place.zone, []).append(number)
+
+    def __getitem__(self, number: int) -> _ReadingPlace:
+        return self.all[number]
+
+    def of(self, zone: str) -> Sequence[int]:
+        """Numbers of the readings of a zone."""
+        return self._in_zone.get(zone, ())
+
+    def from_place(self, zone: str, chainage_m: float) -> Iterator[tuple[int, float]]:
+        """Number of, and signed distance along the line to, each reading in reach of a place."""
+        near = (number for to in self._map.in_reach_of(zone) for number in self.of(to))
+        for number in sorted(near):
+            there = self.all[number]
+            distance_m = self._map.path_distance_m(zone, chainage_m, there.zone, there.chainage_m)
+            assert distance_m is not None
+            yield number, distance_m
+
+    def distances_m(self) -> dict[tuple[int, int], float]:
+        """Signed distance along the line from one reading to another, of all that have one."""
+        return {
+            (number, other): distance_m
+            for number, place in enumerate(self.all)
+            for other, distance_m in self.from_place(place.zone, place.chainage_m)
+            if other != number
+        }
+
+
 class ZoneTracker:
     """Follows every train along the corridor.
 
@@ -97,7 +132,7 @@ class ZoneTracker:
 
     def update(self, time_s: float, readings: Mapping[str, ZoneReading]) -> list[TrainFix]:
         """Fixes of all trains from the readings [zone] of one tick."""
-        places: list[_ReadingPlace] = []
+        located_in: list[_ReadingPlace] = []
         disturbed: list[str] = []
         for name, reading in readings.items():
             if reading is NO_READING:
@@ -107,13 +142,16 @@ class ZoneTracker:
             elif math.isfinite(reading.range_m):
                 located = self._map.zones[name].locate(reading.range_m, reading.variance_m2)
                 if located is not None:
-                    places.append(_ReadingPlace(name, *located))
+                    located_in.append(_ReadingPlace(name, *located))
         self.disturbed = tuple(disturbed)
-        owners = self._assign(time_s, places)
+        places = _Places(self._map, located_in)
+        distances_m = places.distances_m()
+        owners = self._assign(time_s, places, distances_m)
+        owned = {*owners.values()}
         self.unidentified = tuple(
-            place.zone for index, place in enumerate(places) if index not in owners.values()
+            place.zone for index, place in enumerate(places.all) if index not in owned
         )
-        self._learn_order(owners, places)
+        self._learn_order(owners, places, distances_m)
         shared = self._shared_zones(owners, places)
         fixes = []
         for index, train in enumerate(self._trains):
@@ -122,7 +160,12 @@ class ZoneTracker:
             fixes.append(self._fix(train, index in owners, shared, readings))
         return fixes
 
-    def _assign(self, time_s: float, places: Sequence[_ReadingPlace]) -> dict[int, int]:
+    def _assign(
+        self,
+        time_s: float,
+        places: _Places,
+        distances_m: Mapping[tuple[int, int], float],
+    ) -> dict[int, int]:
         """Index of the place of each train."""
         candidates: list[TrainCandidate] = []
         due: set[str] = set()
@@ -134,19 +177,11 @@ class ZoneTracker:
             elif train.zone not in due:
                 # Trains that are due at a zone enter there in their order.
                 due.add(train.zone)
-                here = (n for n, place in enumerate(places) if place.zone == train.zone)
-                candidates.append(TrainCandidate(index, False, dict.fromkeys(here, 0.0)))
-        distances_m = {
-            (one, other): self._path_distance_m(places[one], places[other])
-            for one in range(len(places))
-            for other in range(len(places))
-            if one != other
-        }
+                here = dict.fromkeys(places.of(train.zone), 0.0)
+                candidates.append(TrainCandidate(index, False, here))
         return associate(candidates, distances_m, self._order)
 
-    def _misses(
-        self, train: _TrackedTrain, time_s: float, places: Sequence[_ReadingPlace]
-    ) -> dict[int, float]:
+    def _misses(self, train: _TrackedTrain, time_s: float, places: _Places) -> dict[int, float]:
         """How far each place in reach is from where the train is expected, over what it may be."""
         elapsed_s = time_s - train.seen_s
         expected_m = train.speed_mps * elapsed_s
@@ -154,32 +189,33 @@ class ZoneTracker:
         gate_m = GATE_M + 0.5 * MAX_ACCELERATION_MPS2 * elapsed_s**2 + SIGMAS * sigma_m
         gate_m = min(gate_m, GATE_M + MAX_SPEED_MPS * elapsed_s)
         misses: dict[int, float] = {}
-        for number, place in enumerate(places):
-            distance_m = self._map.path_distance_m(
-                train.zone, train.filtered_m, place.zone, place.chainage_m
-            )
-            if distance_m is None:
-                continue
+        for number, distance_m in places.from_place(train.zone, train.filtered_m):
             miss_m = abs(distance_m - expected_m)
-            slack_m = gate_m + SIGMAS * math.sqrt(place.variance_m2)
+            slack_m = gate_m + SIGMAS * math.sqrt(places[number].variance_m2)
             if miss_m <= slack_m:
                 misses[number] = miss_m / slack_m
         return misses
 
-    def _path_distance_m(self, one: _ReadingPlace, other: _ReadingPlace) -> float | None:
-        return self._map.path_distance_m(one.zone, one.chainage_m, other.zone, other.chainage_m)
-
-    def _learn_order(self, owners: Mapping[int, int], places: Sequence[_ReadingPlace]) -> None:
+    def _learn_order(
+        self,
+        owners: Mapping[int, int],
+        places: _Places,
+        distances_m: Mapping[tuple[int, int], float],
+    ) -> None:
         """Take note of who is ahead of whom among the trains seen now."""
-        seen = sorted(owners)
-        for position, one in enumerate(seen):
-            for other in seen[position + 1 :]:
-                here, there = places[owners[one]], places[owners[other]]
-                distance_m = self._path_distance_m(here, there)
-                zones = self._map.zones
-                if distance_m is None and zones[here.zone].track == zones[there.zone].track:
-                    continue  # out of sight of each other, in an order that stays
+        train_of = {number: train for train, number in owners.items()}
+        for (place, further), distance_m in distances_m.items():
+            one, other = train_of.get(place), train_of.get(further)
+            if one is not None and other is not None and one < other:
                 self._order.learn(one, other, distance_m)
+        zones = self._map.zones
+        for one, other in self._order.known():
+            here, there = owners.get(one), owners.get(other)
+            if here is None or there is None or (here, there) in distances_m:
+                continue
+            # Out of sight of each other on one track, their order stays.
+            if zones[places[here].zone].track != zones[places[there].zone].track:
+                self._order.learn(one, other, None)
 
     def _follow(self, train: _TrackedTrain, time_s: float, place: _ReadingPlace) -> None:
         """Step the train's filter on (chainage, speed) with a new place."""
@@ -222,7 +258,7 @@ class ZoneTracker:
             train.p_vv,
         )
 
-    def _shared_zones(self, owners: Mapping[int, int], places: Sequence[_ReadingPlace]) -> set[str]:
+    def _shared_zones(self, owners: Mapping[int, int], places: _Places) -> set[str]:
         """Zones in which two trains were last seen, one of which is not received alone."""
         seen: dict[str, int] = {}
         for index, train in enumerate(self._trains):

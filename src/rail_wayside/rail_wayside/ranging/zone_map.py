@@ -101,6 +101,10 @@ class ZoneMap:
             matchings = {**ahead, **behind, **matchings}
         return matchings
 
+    def in_reach_of(self, zone: str) -> Iterable[str]:
+        """Zones of the neighbourhood of one, itself too: those with a way along the line."""
+        return self._ways[zone]
+
     def path_distance_m(
         self, zone: str, chainage_m: float, to: str, to_chainage_m: float
     ) -> float | None:

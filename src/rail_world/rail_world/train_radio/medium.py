@@ -22,8 +22,10 @@ Left out: delay (3.3 us/km; the radios advance their timing), errors of oscillat
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import TypeVar
 
@@ -172,7 +174,7 @@ class CbtcMedium:
         ----------
         links : Links
         sent : mapping
-            Base station -> bursts it sends; silent ones are missing.
+            Base station -> bursts it sends, one after the other; silent ones are missing.
         windows : mapping
             (train, channel) -> the spans [start, stop) of samples that the train listens to.
 
@@ -184,7 +186,8 @@ class CbtcMedium:
         Raises
         ------
         ValueError
-            If a burst or a window does not fit the tick or the antennas.
+            If a burst or a window does not fit the tick or the antennas, or bursts of a sender
+            overlap or are not in order.
         """
         alive = self._alive(links)
         ports: dict[tuple[int, int], _Port] = {}
@@ -251,7 +254,7 @@ class CbtcMedium:
             self._antennas[direction][0],
         )
         received: dict[_Key, tuple[Burst, ...]] = {}
-        on_air = _OnAir()
+        on_air = _OnAir(partial(self._check, direction))
         at = 0
         for key, port in ports.items():
             placed = []
@@ -263,9 +266,7 @@ class CbtcMedium:
                 for start, stop, begin in placed
             )
             for base, train, bursts in port.sources:
-                for burst in bursts:
-                    self._check(burst, direction)
-                    on_air.add(base, train, burst, placed)
+                on_air.add(base, train, bursts, placed)
         sent = on_air.sent()
         # In the order of lengths: a sum must not depend on what other ports hear.
         for count, pieces in sorted(on_air.pieces.items()):
@@ -285,7 +286,7 @@ class CbtcMedium:
         dead = {f.base_station for f in self.description.faults if f.acts(links.time_s)}
         return np.array([mast.name not in dead for mast in self.description.base_stations])
 
-    def _check(self, burst: Burst, direction: int) -> None:
+    def _check(self, direction: int, burst: Burst) -> None:
         """Refuse a burst that does not fit."""
         tx = self._antennas[direction][1]
         if burst.samples.ndim != 2 or len(burst.samples) != tx:
@@ -299,32 +300,58 @@ class CbtcMedium:
 class _OnAir:
     """The bursts that somebody hears, side by side, and their pieces by length."""
 
-    def __init__(self) -> None:
+    def __init__(self, check: Callable[[Burst], None]) -> None:
         self.pieces: dict[int, list[Piece]] = {}
+        self._check = check
+        self._spans: dict[int, tuple[list[int], list[int]]] = {}
         self._bursts: list[Burst] = []
-        self._place: dict[int, int] = {}
+        self._cut: dict[int, list[tuple[int, int, int]]] = {}
         self._end = 0
 
     def add(
-        self, base: int, train: int, burst: Burst, windows: Sequence[tuple[int, int, int]]
+        self,
+        base: int,
+        train: int,
+        bursts: Sequence[Burst],
+        windows: Sequence[tuple[int, int, int]],
     ) -> None:
-        """Pieces of a burst on a link that windows (start, stop, place) listen to."""
-        if not any(start < burst.stop and burst.start < stop for start, stop, _ in windows):
-            return
-        place = self._place.get(id(burst))
-        if place is None:
-            place = self._place[id(burst)] = self._end
-            self._bursts.append(burst)
-            self._end += burst.samples.shape[1]
-        for begin, end in _pieces(burst):
-            overlaps = tuple(
-                (max(begin, start) - begin, min(end, stop) - begin, at + max(begin - start, 0))
-                for start, stop, at in windows
-                if start < end and begin < stop
-            )
-            if overlaps:
-                piece = Piece(base, train, begin, place + begin - burst.start, overlaps)
-                self.pieces.setdefault(end - begin, []).append(piece)
+        """Pieces of what a sender sends on a link, that windows (start, stop, place) listen to."""
+        for burst in self._within(bursts, windows):
+            for begin, end, place in self._cut.get(id(burst)) or self._place(burst):
+                overlaps = tuple(
+                    (max(begin, start) - begin, min(end, stop) - begin, at + max(begin - start, 0))
+                    for start, stop, at in windows
+                    if start < end and begin < stop
+                )
+                if overlaps:
+                    piece = Piece(base, train, begin, place, overlaps)
+                    self.pieces.setdefault(end - begin, []).append(piece)
+
+    def _within(
+        self, bursts: Sequence[Burst], windows: Sequence[tuple[int, int, int]]
+    ) -> list[Burst]:
+        """Bursts of a sender that some window listens to: few of the many that a mast sends."""
+        spans = self._spans.get(id(bursts))
+        if spans is None:
+            for burst in bursts:
+                self._check(burst)
+            if any(one.stop > other.start for one, other in pairwise(bursts)):
+                raise ValueError("bursts of a sender overlap, or are not in their order")
+            spans = [burst.start for burst in bursts], [burst.stop for burst in bursts]
+            self._spans[id(bursts)] = spans
+        starts, stops = spans
+        numbers: set[int] = set()
+        for start, stop, _ in windows:
+            numbers.update(range(bisect_right(stops, start), bisect_left(starts, stop)))
+        return [bursts[number] for number in sorted(numbers)]
+
+    def _place(self, burst: Burst) -> list[tuple[int, int, int]]:
+        """Spans [begin, end) of the pieces of a burst, and where each is in what is sent."""
+        self._bursts.append(burst)
+        shift = self._end - burst.start
+        self._cut[id(burst)] = cut = [(begin, end, begin + shift) for begin, end in _pieces(burst)]
+        self._end += burst.samples.shape[1]
+        return cut
 
     def sent(self) -> NDArray[np.float32]:
         """All that is sent [part, antenna, sample]."""

@@ -8,6 +8,7 @@ import shutil
 import signal
 import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -76,6 +77,9 @@ class RunOptions:
     record: Path | None = None
     switches: bool = False
     allow_failures: bool = False
+    #: Of a run in one process: is given its nodes and their context before they are spun. The
+    #: report is then not printed.
+    probe: Callable[[list[Any], Any], None] | None = None
 
     @property
     def with_external_nodes(self) -> bool:
@@ -271,6 +275,8 @@ class _LaunchedRun:
         executor = EventsExecutor(context=context)
         for node in nodes:
             executor.add_node(node)
+        if self._options.probe is not None:
+            self._options.probe(nodes, context)
         context.delivery.settle(executor)
         self._arrange_kills(executor, nodes)
         with Progress(
@@ -421,7 +427,8 @@ class _LaunchedRun:
 
     def _finish(self, report: dict[str, Any] | None) -> int:
         if report is not None:
-            print_report(report, self._console)
+            if self._options.probe is None:
+                print_report(report, self._console)
             if self._options.report is not None:
                 write_report(report, self._options.report)
                 self._console.print(f"report written to {self._options.report}")

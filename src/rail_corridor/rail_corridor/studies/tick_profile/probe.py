@@ -1,0 +1,134 @@
+"""Measures the ticks of a run in one process, from within it."""
+
+from __future__ import annotations
+
+import gc
+import statistics
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable
+from typing import Any, Final
+
+from rail_corridor.equipment.registry import WORLD, node_kinds, subsystems
+from rail_msgs_py.delivery import LocalReader
+from rail_msgs_py.topics.tick import CLOCK
+
+from .attribution import Attribution, Attributor, kind_of, modules_by_file
+from .recorded_calls import CallRecorder, replay_s
+from .recorded_messages import MessageRecorder, hand_over_s
+from .sampler import Sampler, Stack
+from .schedule import Phase, Schedule
+
+#: Packages that the callbacks of the report begin in.
+_REPORT: Final = ("rail_corridor.report", "rail_corridor.run_data")
+_ROUNDS: Final = 5
+#: Wall time after which no further round begins.
+_ENOUGH_S: Final = 2.0
+
+
+class TickProbe:
+    """Samples a run tick by tick, and records some of its ticks for the floors.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    """
+
+    def __init__(self, schedule: Schedule) -> None:
+        self._schedule = schedule
+        self._tick = -1
+        self._phase: Phase = "warm-up"
+        self._begin_tick, self._begin_s = 0, 0.0
+        #: Wall time and number of the ticks of each phase.
+        self.wall_s: dict[Phase, float] = defaultdict(float)
+        self.ticks: Counter[Phase] = Counter()
+        self.sampler = Sampler()
+        #: Nodes of each kind.
+        self.nodes: Counter[str] = Counter()
+
+    def attach(self, nodes: list[Any], context: Any) -> None:
+        """Begin with the first tick of nodes that share a context and its delivery."""
+        kinds, modules = kinds_by_module(), modules_by_file()
+        for node in nodes:
+            module = type(node).__module__
+            self.nodes[kind_of(module, kinds) or kinds.setdefault(module, module)] += 1
+        self._attributor = Attributor(kinds, modules)
+        self.calls = CallRecorder(modules)
+        self._context = context
+        reader = LocalReader(self, self._on_clock, self._on_clock)
+        context.delivery.read(CLOCK.name(), reader, lambda: None)
+
+    def _on_clock(self, _: Any) -> None:
+        now_s = time.perf_counter()
+        self._tick += 1
+        phase = self._schedule.phase(self._tick)
+        if phase == self._phase and self._tick > 0:
+            return
+        self.wall_s[self._phase] += now_s - self._begin_s if self._tick else 0.0
+        self.ticks[self._phase] += self._tick - self._begin_tick
+        self._end(self._phase)
+        self._phase = phase
+        self._begin(phase)
+        self._begin_tick, self._begin_s = self._tick, time.perf_counter()
+
+    def _begin(self, phase: Phase) -> None:
+        if phase == "recorded":
+            self.messages = MessageRecorder(self._context.delivery)
+            self.messages.start()
+            self.calls.start()
+        elif phase == "sampled":
+            self.sampler.start()
+
+    def _end(self, phase: Phase) -> None:
+        if phase == "recorded":
+            self.calls.stop()
+            self.messages.stop()
+            gc.collect()
+            gc.freeze()  # what has been recorded stays: no need to look through it in every tick
+        elif phase == "sampled":
+            self.sampler.stop()
+
+    def finish(self) -> None:
+        """End what is under way, after a run that has ended at any time."""
+        if self._phase == "recorded":
+            self.calls.stop()
+        self.sampler.stop()
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run came to the end of a stretch of samples."""
+        return self.ticks["sampled"] > 0
+
+    def attribute(self, stack: Stack) -> Attribution:
+        """Whose a sample is."""
+        return self._attributor.attribute([code.co_filename for code in stack])
+
+    def tick_s(self, phase: Phase) -> float:
+        """Wall time of a tick of a phase."""
+        return self.wall_s[phase] / self.ticks[phase]
+
+    def transport_floor_s(self) -> float:
+        """Wall time to hand over the messages of a tick to readers that do nothing."""
+        recorded = self.messages
+        return self._of_a_tick(lambda: hand_over_s(recorded.messages, recorded.readers))
+
+    def arithmetic_floor_s(self) -> float:
+        """Wall time of the arithmetic of a tick, one call after the other."""
+        return self._of_a_tick(lambda: replay_s(self.calls.calls))
+
+    def _of_a_tick(self, measure_s: Callable[[], float]) -> float:
+        measure_s()  # kernels may be compiled for other arrays than those of the run
+        begin_s, rounds = time.perf_counter(), [measure_s()]
+        while len(rounds) < _ROUNDS and time.perf_counter() - begin_s < _ENOUGH_S:
+            rounds.append(measure_s())
+        return statistics.median(rounds) / self.ticks["recorded"]
+
+
+def kinds_by_module() -> dict[str, str]:
+    """Kind of every node by the module of its class, and the report's packages."""
+    owners = {kind.name: f"{one.name}: " for one in subsystems() for kind in one.nodes}
+    kinds = {
+        kind.target.partition(":")[0]: f"{owners.get(kind.name, '')}{kind.name}"
+        for kind in (WORLD, *node_kinds().values())
+    }
+    return kinds | dict.fromkeys(_REPORT, "report")

@@ -1,0 +1,149 @@
+"""Calls of arithmetic that the nodes make, recorded with what they are given, and made again."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import sys
+import time
+from collections import ChainMap
+from collections.abc import Callable, Iterator, Mapping
+from types import CodeType, FrameType
+from typing import Any, NamedTuple
+
+from .attribution import stage_of
+
+
+class Call(NamedTuple):
+    """One call; what it was given is as it was before the first call that was recorded."""
+
+    function: Callable[..., Any]
+    positional: list[Any]
+    keywords: dict[str, Any]
+    #: Whether it was given copies, not what the nodes go on with.
+    copied: bool
+
+
+class CallRecorder:
+    """Records the calls that lead from other code into arithmetic, in the order of the calls.
+
+    What a recorded call does inside is part of it. Functions that cannot be found by their name, as
+    those within others, are not recorded, but what they call is.
+
+    Parameters
+    ----------
+    modules : mapping
+        Name of the module by its file.
+    """
+
+    def __init__(self, modules: Mapping[str, str]) -> None:
+        self._modules = modules
+        self._arithmetic: dict[CodeType, bool] = {}
+        self._inside: FrameType | None = None
+        self._copies: dict[int, Any] = {}
+        self._originals: list[Any] = []
+        self.calls: list[Call] = []
+
+    def start(self) -> None:
+        """Record from now on what this thread calls."""
+        sys.setprofile(self._see)
+
+    def stop(self) -> None:
+        """Record no longer."""
+        sys.setprofile(None)
+        self._inside = None
+
+    def _see(self, frame: FrameType, event: str, _: Any) -> None:
+        if self._inside is not None:
+            if event == "return" and frame is self._inside:
+                self._inside = None
+        elif event == "call" and self._is_arithmetic(frame.f_code):
+            function = function_of(frame)
+            if function is not None:
+                self._inside = frame
+                self.calls.append(self._call(function, frame))
+
+    def _is_arithmetic(self, code: CodeType) -> bool:
+        found = self._arithmetic.get(code)
+        if found is None:
+            module = self._modules.get(code.co_filename, "")
+            found = self._arithmetic[code] = stage_of(module) == "arithmetic"
+        return found
+
+    def _call(self, function: Callable[..., Any], frame: FrameType) -> Call:
+        arguments = arguments_of(frame)
+        # A copy that fails midway must leave nothing behind that a later one finds.
+        trial: Any = ChainMap({}, self._copies)
+        try:
+            positional, keywords = copy.deepcopy(arguments, trial)
+        except Exception:
+            return Call(function, *arguments, copied=False)
+        # Under the number of the memo itself are the originals, which keep their numbers that way.
+        self._originals.append(trial.maps[0].pop(id(trial), None))
+        self._copies.update(trial.maps[0])
+        return Call(function, positional, keywords, copied=True)
+
+
+def arguments_of(frame: FrameType) -> tuple[list[Any], dict[str, Any]]:
+    """What a function has just been called with: by position, and by name."""
+    found = inspect.getargvalues(frame)
+    by_position = frame.f_code.co_argcount
+    positional = [found.locals[name] for name in found.args[:by_position]]
+    keywords = {name: found.locals[name] for name in found.args[by_position:]}
+    if found.varargs is not None:
+        positional += found.locals[found.varargs]
+    if found.keywords is not None:
+        keywords |= found.locals[found.keywords]
+    return positional, keywords
+
+
+def function_of(frame: FrameType) -> Callable[..., Any] | None:
+    """The function that a frame runs, None if its name does not lead to it."""
+    code = frame.f_code
+    if code.co_flags & (inspect.CO_GENERATOR | inspect.CO_COROUTINE | inspect.CO_ASYNC_GENERATOR):
+        return None
+    for found in _bearers(frame):
+        for inner in ("", "fget", "func", "__func__", "__wrapped__", "_implementation"):
+            function = getattr(found, inner, None) if inner else found
+            if getattr(function, "__code__", None) is code:
+                return function
+    return None
+
+
+def _bearers(frame: FrameType) -> Iterator[Any]:
+    """Whatever bears the name of the function of a frame."""
+    code, name = frame.f_code, frame.f_code.co_name
+    if code.co_argcount:
+        first = frame.f_locals.get(code.co_varnames[0])
+        for owner in (*type(first).__mro__, *(inspect.getmro(first) if _is_class(first) else ())):
+            if name in vars(owner):
+                yield vars(owner)[name]
+    yield frame.f_globals.get(name)
+    path = getattr(code, "co_qualname", name).split(".")  # from Python 3.11 on
+    if len(path) == 2:
+        yield vars(frame.f_globals[path[0]]).get(name) if path[0] in frame.f_globals else None
+
+
+def _is_class(value: Any) -> bool:
+    return isinstance(value, type)
+
+
+def replay_s(calls: list[Call]) -> float:
+    """Wall time that recorded calls take one after the other [s]; they may be replayed again.
+
+    One that fails, because what it works on has been changed by others than the calls recorded,
+    counts for as long as it took.
+    """
+    given = [(call.positional, call.keywords) for call in calls if call.copied]
+    fresh = iter(copy.deepcopy(given))
+    prepared = [
+        (call.function, *(next(fresh) if call.copied else (call.positional, call.keywords)))
+        for call in calls
+    ]
+    begin_s = time.perf_counter()
+    for function, positional, keywords in prepared:
+        try:
+            function(*positional, **keywords)
+        except Exception:
+            continue
+    return time.perf_counter() - begin_s

@@ -70,7 +70,7 @@ class Attributor:
         """Whose a stack is, by the files of its functions, the root first."""
         modules = [self._modules.get(file, "") for file in files]
         stages = (stage_of(module) for module in reversed(modules))
-        stage = next((stage for stage in stages if stage is not None), "interpreter")
+        stage: Stage = next((stage for stage in stages if stage is not None), "interpreter")
         for begin, module in enumerate(modules):
             kind = kind_of(module, self._kinds)
             if kind is not None:

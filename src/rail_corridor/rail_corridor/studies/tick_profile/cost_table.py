@@ -122,8 +122,8 @@ def lines_of(costs: TickCosts) -> list[str]:
     return [
         f"floors: transport {costs.transport_ms:.3f} ms, arithmetic {costs.arithmetic_ms:.3f} ms; "
         f"a tick takes {costs.tick_ms / costs.floor_ms:.2f} times both",
-        f"{costs.tick_s * 1e3 / costs.tick_ms:.1f} times real time; {costs.samples} samples, a tick "
-        f"took {costs.sampling:+.1%} while sampled (the table is that of ticks that were not)",
+        f"{costs.tick_s * 1e3 / costs.tick_ms:.1f} times real time; {costs.samples} samples, which "
+        f"made a tick {costs.sampling:+.1%} longer (the sums are of ticks without)",
     ]
 
 

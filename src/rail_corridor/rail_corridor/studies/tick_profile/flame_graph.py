@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from pyinstrument.renderers import HTMLRenderer, SpeedscopeRenderer
@@ -22,7 +22,7 @@ _ROOT = _frame("tick")
 
 
 def write_flame_graph(
-    stacks: Mapping[Stack, float],
+    stacks: Sequence[tuple[Stack, float]],
     attribute: Callable[[Stack], Attribution],
     title: str,
     path: Path,
@@ -33,19 +33,20 @@ def write_flame_graph(
 
     Parameters
     ----------
-    stacks : mapping
-        Wall time of each stack [s].
+    stacks : sequence of stack and wall time [s]
     attribute : callable
         Whose a stack is.
     title : str
     path : Path
     """
     records: list[tuple[list[str], float]] = []
-    for stack, seconds in stacks.items():
+    for stack, seconds in stacks:
         whose = attribute(stack)
         of_callback = stack[whose.begin :] if whose.begin >= 0 else stack[-1:]
         frames = [
-            _frame(getattr(code, "co_qualname", code.co_name), code.co_filename, code.co_firstlineno)
+            _frame(
+                getattr(code, "co_qualname", code.co_name), code.co_filename, code.co_firstlineno
+            )
             for code in of_callback
         ]
         records.append(([_ROOT, _frame(whose.kind), *frames], seconds))
@@ -53,7 +54,7 @@ def write_flame_graph(
     session = Session(
         frame_records=records,
         start_time=0.0,
-        duration=sum(stacks.values()),
+        duration=sum(seconds for _, seconds in stacks),
         min_interval=INTERVAL_S,
         max_interval=INTERVAL_S,
         sample_count=len(records),

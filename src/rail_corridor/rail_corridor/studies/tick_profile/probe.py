@@ -43,6 +43,8 @@ class TickProbe:
         self.wall_s: dict[Phase, float] = defaultdict(float)
         self.ticks: Counter[Phase] = Counter()
         self.sampler = Sampler()
+        self._messages: list[MessageRecorder] = []
+        self._calls: list[CallRecorder] = []
         #: Nodes of each kind.
         self.nodes: Counter[str] = Counter()
 
@@ -53,8 +55,7 @@ class TickProbe:
             module = type(node).__module__
             self.nodes[kind_of(module, kinds) or kinds.setdefault(module, module)] += 1
         self._attributor = Attributor(kinds, modules)
-        self.calls = CallRecorder(modules)
-        self._context = context
+        self._modules, self._context = modules, context
         reader = LocalReader(self, self._on_clock, self._on_clock)
         context.delivery.read(CLOCK.name(), reader, lambda: None)
 
@@ -73,16 +74,17 @@ class TickProbe:
 
     def _begin(self, phase: Phase) -> None:
         if phase == "recorded":
-            self.messages = MessageRecorder(self._context.delivery)
-            self.messages.start()
-            self.calls.start()
+            self._messages.append(MessageRecorder(self._context.delivery))
+            self._messages[-1].start()
+            self._calls.append(CallRecorder(self._modules))
+            self._calls[-1].start()
         elif phase == "sampled":
             self.sampler.start()
 
     def _end(self, phase: Phase) -> None:
         if phase == "recorded":
-            self.calls.stop()
-            self.messages.stop()
+            self._calls[-1].stop()
+            self._messages[-1].stop()
             gc.collect()
             gc.freeze()  # what has been recorded stays: no need to look through it in every tick
         elif phase == "sampled":
@@ -90,8 +92,9 @@ class TickProbe:
 
     def finish(self) -> None:
         """End what is under way, after a run that has ended at any time."""
-        if self._phase == "recorded":
-            self.calls.stop()
+        if self._phase == "recorded":  # a stretch that is not whole
+            self._calls.pop().stop()
+            self._messages.pop()
         self.sampler.stop()
 
     @property
@@ -109,12 +112,13 @@ class TickProbe:
 
     def transport_floor_s(self) -> float:
         """Wall time to hand over the messages of a tick to readers that do nothing."""
-        recorded = self.messages
-        return self._of_a_tick(lambda: hand_over_s(recorded.messages, recorded.readers))
+        return self._of_a_tick(
+            lambda: sum(hand_over_s(one.messages, one.readers) for one in self._messages)
+        )
 
     def arithmetic_floor_s(self) -> float:
         """Wall time of the arithmetic of a tick, one call after the other."""
-        return self._of_a_tick(lambda: replay_s(self.calls.calls))
+        return self._of_a_tick(lambda: sum(replay_s(one.calls) for one in self._calls))
 
     def _of_a_tick(self, measure_s: Callable[[], float]) -> float:
         measure_s()  # kernels may be compiled for other arrays than those of the run

@@ -41,7 +41,7 @@ def profile(scenario: Scenario, flame: Path | None, rows: Path | None, console: 
     title = f"{scenario.name}, seed {scenario.seed}: where a tick goes"
     print_costs(costs, title, console)
     if flame is not None:
-        write_flame_graph(probe.sampler.wall_s, probe.attribute, title, flame)
+        write_flame_graph(probe.sampler.wall_s(), probe.attribute, title, flame)
         console.print(f"flame graph written to {flame}", highlight=False, soft_wrap=True)
     if rows is not None:
         rows.write_text(json.dumps({"scenario": scenario.name, **costs.values()}, indent=2) + "\n")
@@ -53,7 +53,7 @@ def tick_costs(scenario: Scenario, probe: TickProbe) -> TickCosts:
     plain_s, sampled_s = probe.tick_s("plain"), probe.tick_s("sampled")
     samples = (
         (whose.kind, whose.stage, seconds)
-        for stack, seconds in probe.sampler.wall_s.items()
+        for stack, seconds in probe.sampler.wall_s()
         for whose in (probe.attribute(stack),)
     )
     return TickCosts(

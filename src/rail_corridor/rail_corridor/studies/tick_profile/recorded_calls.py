@@ -115,17 +115,13 @@ def _bearers(frame: FrameType) -> Iterator[Any]:
     code, name = frame.f_code, frame.f_code.co_name
     if code.co_argcount:
         first = frame.f_locals.get(code.co_varnames[0])
-        for owner in (*type(first).__mro__, *(inspect.getmro(first) if _is_class(first) else ())):
+        for owner in (*type(first).__mro__, *(first.__mro__ if isinstance(first, type) else ())):
             if name in vars(owner):
                 yield vars(owner)[name]
     yield frame.f_globals.get(name)
     path = getattr(code, "co_qualname", name).split(".")  # from Python 3.11 on
     if len(path) == 2:
         yield vars(frame.f_globals[path[0]]).get(name) if path[0] in frame.f_globals else None
-
-
-def _is_class(value: Any) -> bool:
-    return isinstance(value, type)
 
 
 def replay_s(calls: list[Call]) -> float:

@@ -51,9 +51,7 @@ class MessageRecorder:
         return sum(len(self.readers[name]) for name, _ in self.messages)
 
 
-def hand_over_s(
-    messages: Iterable[tuple[str, Sendable]], readers: dict[str, list[bool]]
-) -> float:
+def hand_over_s(messages: Iterable[tuple[str, Sendable]], readers: dict[str, list[bool]]) -> float:
     """Wall time to hand messages to as many readers that do nothing [s].
 
     Parameters

@@ -25,9 +25,11 @@ class Sampler:
     """Samples of the main thread, which also starts and stops it."""
 
     def __init__(self) -> None:
-        #: Wall time of each stack [s].
-        self.wall_s: dict[Stack, float] = defaultdict(float)
         self.samples = 0
+        self._taken: list[tuple[list[CodeType], float]] = []
+        # The hash of a function's code is that of all its instructions: here it goes by identity.
+        self._wall_s: dict[tuple[int, ...], float] = defaultdict(float)
+        self._stacks: dict[tuple[int, ...], Stack] = {}
         self._last_s = 0.0
 
     def start(self) -> None:
@@ -39,9 +41,20 @@ class Sampler:
 
     def stop(self) -> None:
         """Sample no longer; does no harm if it was not started."""
-        if signal.getsignal(signal.SIGALRM) == self._sample:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-            signal.signal(signal.SIGALRM, self._before)
+        if signal.getsignal(signal.SIGALRM) != self._sample:
+            return
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, self._before)
+        self.samples += len(self._taken)
+        for under_way, seconds in self._taken:
+            key = tuple(map(id, under_way))
+            self._wall_s[key] += seconds
+            self._stacks.setdefault(key, tuple(reversed(under_way)))
+        self._taken.clear()
+
+    def wall_s(self) -> list[tuple[Stack, float]]:
+        """Every stack that was met, and how long [s]."""
+        return [(self._stacks[key], seconds) for key, seconds in self._wall_s.items()]
 
     def _sample(self, _: int, frame: FrameType | None) -> None:
         now_s = time.perf_counter()
@@ -49,6 +62,5 @@ class Sampler:
         while frame is not None:
             under_way.append(frame.f_code)
             frame = frame.f_back
-        self.wall_s[(*reversed(under_way),)] += now_s - self._last_s
-        self.samples += 1
+        self._taken.append((under_way, now_s - self._last_s))
         self._last_s = now_s

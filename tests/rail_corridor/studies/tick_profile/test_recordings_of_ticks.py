@@ -1,0 +1,168 @@
+"""Calls and messages that are recorded, and made again."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rail_corridor.studies.tick_profile.attribution import Attribution
+from rail_corridor.studies.tick_profile.flame_graph import write_flame_graph
+from rail_corridor.studies.tick_profile.recorded_calls import CallRecorder, replay_s
+from rail_corridor.studies.tick_profile.recorded_messages import MessageRecorder, hand_over_s
+from rail_corridor.studies.tick_profile.sampler import Sampler
+from rail_msgs_py.delivery import LocalDelivery, LocalReader
+
+SEEN: list[Any] = []
+MODULES = {__file__: "rail_signals.of_this_test"}
+CALLER = (
+    "def call(function, *arguments, **keywords):\n    return function(*arguments, **keywords)\n"
+)
+
+
+class Meter:
+    """Arithmetic with a state."""
+
+    def __init__(self, lock: bool = False) -> None:
+        self.sum = 0.0
+        self.lock = threading.Lock() if lock else None  # cannot be copied
+
+    def add(self, value: float, *more: float, scale: float = 1.0) -> None:
+        self._add((value + sum(more)) * scale)
+
+    def _add(self, value: float) -> None:
+        self.sum += value
+        SEEN.append(self.sum)
+
+    @property
+    def mean(self) -> float:
+        return self.sum / 2.0
+
+    @staticmethod
+    def fail(values: list[float]) -> float:
+        return values[0]
+
+
+def recorded(*steps: tuple[Any, ...]) -> CallRecorder:
+    """Return what is recorded of calls out of another file."""
+    names: dict[str, Any] = {}
+    exec(compile(CALLER, "elsewhere.py", "exec"), names)
+    recorder = CallRecorder(MODULES)
+    call = names["call"]
+    recorder.start()
+    try:
+        for function, *arguments in steps:
+            call(function, *arguments)
+    finally:
+        recorder.stop()
+    return recorder
+
+
+@pytest.fixture(autouse=True)
+def forget() -> None:
+    SEEN.clear()
+
+
+@pytest.mark.parametrize("lock", [False, True])
+def test_calls_into_arithmetic_are_made_again_inner_ones_as_part_of_them(lock: bool) -> None:
+    meter = Meter(lock)
+    calls = recorded((meter.add, 1.0, 2.0), (meter.add, 3.0)).calls
+    assert [call.function.__name__ for call in calls] == ["add", "add"]
+    assert [call.copied for call in calls] == [not lock] * 2
+    assert SEEN == [3.0, 6.0]
+    assert replay_s(calls) > 0.0
+    assert SEEN[2:] == ([9.0, 12.0] if lock else [3.0, 6.0])
+    replay_s(calls)
+    assert SEEN[4:] == ([15.0, 18.0] if lock else [3.0, 6.0])
+    assert meter.sum == (18.0 if lock else 6.0)
+
+
+def test_what_arguments_become_later_does_not_count() -> None:
+    values = [1.0]
+    recorder = recorded((Meter.fail, values))
+    values.clear()
+    ((values_then,),) = [call.positional for call in recorder.calls]
+    assert values_then == [1.0]
+
+
+def test_a_call_that_fails_does_not_end_a_replay() -> None:
+    meter = Meter()
+    with pytest.raises(IndexError):
+        recorded((Meter.fail, []))
+    calls = recorded((meter.add, 1.0)).calls
+    broken = calls[0]._replace(positional=[])
+    replay_s([broken, *calls])
+    assert SEEN == [1.0, 1.0]
+
+
+class Stamp:
+    """A view that counts how often it is serialised."""
+
+    stamp_ns = 0
+    serialised = 0
+
+    def to_cdr(self) -> bytes:
+        self.serialised += 1
+        return b"stamp"
+
+
+def test_messages_are_recorded_for_a_while_and_handed_over_as_they_were() -> None:
+    delivery = LocalDelivery()
+    got: list[Any] = []
+    delivery.read("/a", LocalReader("x", got.append, got.append), lambda: None)
+    delivery.read("/a", LocalReader("y", got.append), lambda: None)
+    recorder = MessageRecorder(delivery)
+
+    def send(message: Any) -> None:
+        delivery.put(delivery.line("/a"), message, None)
+        delivery.run()
+
+    view = Stamp()
+    send(b"before")
+    recorder.start()
+    send(view)
+    send(b"bytes")
+    recorder.stop()
+    send(b"after")
+    assert recorder.messages == [("/a", view), ("/a", b"bytes")]
+    assert recorder.readers == {"/a": [True, False]}
+    assert got == [b"before", b"before", view, b"stamp", b"bytes", b"bytes", b"after", b"after"]
+    before = view.serialised
+    assert hand_over_s(recorder.messages, recorder.readers) > 0.0
+    assert view.serialised == before + 1
+    assert len(got) == 8
+
+
+def test_a_sampler_finds_what_the_time_goes_into() -> None:
+    sampler = Sampler()
+
+    def busy() -> None:
+        until_s = time.perf_counter() + 0.1
+        while time.perf_counter() < until_s:
+            pass
+
+    sampler.stop()  # does no harm
+    sampler.start()
+    busy()
+    sampler.stop()
+    busy()
+    of_busy = sum(s for stack, s in sampler.wall_s() if stack[-1] is busy.__code__)
+    assert 0.05 < of_busy < 0.19
+    assert sampler.samples > 10
+
+
+@pytest.mark.parametrize("suffix", ["html", "json"])
+def test_a_flame_graph_begins_with_the_kind_of_node(tmp_path: Path, suffix: str) -> None:
+    stack = (recorded.__code__,)
+    path = tmp_path / f"a.{suffix}"
+    stacks = [((*stack, Meter.add.__code__), 0.25), ((*stack, Meter.fail.__code__), 0.5)]
+    write_flame_graph(stacks, lambda _: Attribution("world", "arithmetic", 1), "title", path)
+    text = path.read_text()
+    assert "world" in text and "add" in text and "title" in text
+    if suffix == "json":
+        names = [frame["name"] for frame in json.loads(text)["shared"]["frames"]]
+        assert names[:2] == ["tick", "world"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -53,7 +54,7 @@ def write_flame_graph(
     records.sort()  # equal frames side by side: along the time axis they are one
     session = Session(
         frame_records=records,
-        start_time=0.0,
+        start_time=time.time(),
         duration=sum(seconds for _, seconds in stacks),
         min_interval=INTERVAL_S,
         max_interval=INTERVAL_S,

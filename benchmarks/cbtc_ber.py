@@ -45,6 +45,8 @@ FOLDER = Path(__file__).parent / "peers"
 PEERS = {"komm": "komm_ber.py", "pyphysim": "pyphysim_ber.py"}
 #: Bits of a pass: some tenths of a second each.
 BITS = {"ours": 48_000_000, "NumPy": 1_000_000, "komm": 1_000_000, "pyphysim": 50_000}
+#: Code blocks of a step of ours, as many as make the highest rate.
+CODE_BLOCKS = 32_768
 EB_N0_DB = 5.0
 ROUNDS = 7
 PASSES = 3
@@ -73,7 +75,7 @@ def rows(names: tuple[str, ...] = ()) -> Iterator[dict[str, Any]]:
 def _row(name: str, scheme: Scheme, pythons: dict[str, str | None]) -> dict[str, Any]:
     """Measure one row."""
     eb_n0 = 10 ** (EB_N0_DB / 10)
-    fast = DiversityLink(scheme, eb_n0)
+    fast = DiversityLink(scheme, eb_n0, code_blocks=CODE_BLOCKS)
     plain = PlainLink(scheme, eb_n0, code_blocks=2048)
     generators = np.random.SFC64(1), np.random.PCG64(2)
     counts: dict[str, list[Count]] = {"ours": [], "NumPy": []}

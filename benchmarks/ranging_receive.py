@@ -7,6 +7,10 @@ checked against the truth. The line receiver also searches carrier offsets up to
 (300 km/h and 0.1 ppm at 2.6 GHz make 983 Hz) or 5 kHz, and estimates noise, misfit and
 detection. CPU time of one process is counted; matrix products use one thread. Each round
 takes the best of a few passes on either side, the figure is the median of the rounds.
+
+The bound of a batch is what reading the samples once and summing their squares takes, in the same
+rounds; that of a single burst is the same receiver with many bursts of that length at once, where
+no call but the compiled arithmetic is left.
 """
 
 from __future__ import annotations
@@ -55,6 +59,7 @@ def rows() -> list[dict[str, Any]]:
         ("ranging.receive_5khz", wide, bursts),
     )
     ours: dict[str, list[float]] = {name: [] for name, _, _ in cases}
+    bounds: dict[str, list[float]] = {name: [] for name, _, _ in cases}
     peer: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bursts.npy"
@@ -64,6 +69,7 @@ def rows() -> list[dict[str, Any]]:
                 rate, found = _rate(receiver, block)
                 _check(found - lag, 6 * bound_rad, "line receiver")
                 ours[name].append(rate)
+                bounds[name].append(_reading_rate(block))
             if python:
                 rate, found = _peer_rate(python, path, signal)
                 _check((found - lag)[1:], 6 * bound_rad + 0.01, "GNU Radio")
@@ -71,7 +77,9 @@ def rows() -> list[dict[str, Any]]:
     peer_rate = statistics.median(peer) if peer else None
     peer_name = "GNU Radio" if peer else "GNU Radio (not installed)"
 
-    def row(name: str, rate: float, against: float | None, label: str) -> dict[str, Any]:
+    def row(
+        name: str, rate: float, against: float | None, label: str, bound: float
+    ) -> dict[str, Any]:
         return {
             "name": name,
             "unit": "bursts/CPU-s",
@@ -79,16 +87,22 @@ def rows() -> list[dict[str, Any]]:
             "peer_name": label,
             "peer": against,
             "ratio": rate / against if against else None,
-            "bound": None,
+            "bound": bound,
         }
 
-    single = _single_rate(rng)
+    single, arithmetic = _single_rates(rng)
     return [
         *(
-            row(name, statistics.median(rates), peer_rate, peer_name)
+            row(
+                name,
+                statistics.median(rates),
+                peer_rate,
+                peer_name,
+                statistics.median(bounds[name]),
+            )
             for name, rates in ours.items()
         ),
-        row("ranging.receive_single_960", single, None, "none"),
+        row("ranging.receive_single_960", single, None, "none", arithmetic),
     ]
 
 
@@ -115,18 +129,34 @@ def _rate(receiver: FmToneReceiver, bursts: np.ndarray) -> tuple[float, np.ndarr
     return len(bursts) / min(cpu_s), found.phase_lag_rad[:, 0]
 
 
-def _single_rate(rng: np.random.Generator) -> float:
-    """Count calls per CPU-second for one burst of 960 samples, as a station makes each tick."""
+def _reading_rate(bursts: np.ndarray) -> float:
+    """Bursts per CPU-second whose samples are read and squared, best of the passes."""
+    parts = bursts.view(bursts.real.dtype)
+    cpu_s = []
+    for _ in range(PASSES):
+        start = time.process_time()
+        np.vecdot(parts, parts)
+        cpu_s.append(time.process_time() - start)
+    return len(bursts) / min(cpu_s)
+
+
+def _single_rates(rng: np.random.Generator) -> tuple[float, float]:
+    """Bursts of 960 samples per CPU-second: in single calls, as a station makes, and in one."""
     signal = RangingSignal()
     receiver = FmToneReceiver(signal)
     burst = _bursts(rng, signal, 1)[1][0].astype(np.complex128)
-    rates = []
+    many = np.tile(burst, (40, 1))
+    rates, arithmetic = [], []
     for _ in range(ROUNDS):
         start = time.process_time()
-        for _ in range(500):
+        for _ in range(1000):
             receiver.estimate(burst)
-        rates.append(500 / (time.process_time() - start))
-    return statistics.median(rates)
+        rates.append(1000 / (time.process_time() - start))
+        start = time.process_time()
+        for _ in range(50):
+            receiver.estimate(many)
+        arithmetic.append(50 * len(many) / (time.process_time() - start))
+    return statistics.median(rates), statistics.median(arithmetic)
 
 
 def _peer_python() -> str | None:
@@ -165,7 +195,7 @@ def main() -> None:
         ratio = f"{row['ratio']:.2f} x" if row["ratio"] else "-"
         print(
             f"{row['name']:28} {row['ours']:10.0f} {row['unit']}"
-            f"  {row['peer_name']}: {peer}  ratio {ratio}"
+            f"  {row['peer_name']}: {peer}  ratio {ratio}  bound {row['bound']:.0f}"
         )
 
 

@@ -95,6 +95,16 @@ class Graph:
             self._executor.spin_until_future_complete(self._reached, timeout_sec=PATIENCE_S)
         assert predicate(), "did not come true in time"
 
+    def told(self, aspect: str) -> list[tuple[bytes, str]]:
+        """Return level and message of an aspect, by the end of its name, as they changed."""
+        said = [
+            (status.level, status.message)
+            for message in self.diagnostics
+            for status in message.status
+            if status.name.endswith(aspect)
+        ]
+        return [each for n, each in enumerate(said) if n == 0 or each != said[n - 1]]
+
     def call(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service."""
         client = self.bystander.create_client(kind, name)

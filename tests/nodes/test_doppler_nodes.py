@@ -341,7 +341,7 @@ def test_switched_off_it_knows_nothing_and_on_again_it_begins_anew(graph: Any, p
         (ReferenceStationNode, {"slot": 10}, "slot: 10"),
         (ReferenceStationNode, {"tick_s": 0.10001}, "tick_s: 0.10001"),
         (ReferenceStationNode, {"samples": 1000}, "reference tones"),
-        (DopplerPositionerNode, {"station_x_m": (1.0,)}, "doppler: chainage_m"),
+        (DopplerPositionerNode, {"station_x_m": (1.0,)}, "doppler: line_chainage_m: ()"),
         (DopplerPositionerNode, {"placed_m": 0.0}, "placed_m"),
     ],
 )

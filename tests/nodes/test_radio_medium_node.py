@@ -13,6 +13,7 @@ from rail_corridor.equipment.ranging.nodes import MEDIUM
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plan.plan import Plan, make_plan
 from rail_msgs_py.failures import failure
+from rail_msgs_py.parameters import ParameterError
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.table import Table
 from rail_msgs_py.topics.ranging import LINKS, VRS_RX, VRS_TX, WRS_RX, WRS_TX
@@ -187,5 +188,5 @@ def test_who_is_named_failed_by_others_is_not_waited_for(graph: Any, plan: Plan)
 
 def test_a_missing_world_file_is_an_error(graph: Any, tmp_path: Path) -> None:
     parameters = {"world_file": str(tmp_path / "none.json")}
-    with pytest.raises(OSError, match=r"none\.json"):
+    with pytest.raises(ParameterError, match=r"radio_medium: world_file: .*none\.json': No such"):
         RadioMediumNode(context=graph.context, parameters=parameters, services=False)

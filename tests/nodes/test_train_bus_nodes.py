@@ -128,13 +128,7 @@ def test_a_tail_without_a_bus_says_so(graph: Any) -> None:
     found = last(tail.link)
     assert (found["received"], found["lost"]) == (1.0, 11.0)
     assert math.isnan(found["ebn0_db"])
-    told = [
-        (status.level, status.message)
-        for message in graph.diagnostics
-        for status in message.status
-        if status.name == "/train_1/bus_tail: train bus"
-    ]
-    assert told == [
+    assert graph.told("/train_1/bus_tail: train bus") == [
         (DiagnosticStatus.OK, "hears the head"),
         (DiagnosticStatus.WARN, "loses messages of the head"),
         (DiagnosticStatus.ERROR, "the head is not received"),
@@ -295,15 +289,10 @@ def test_a_splice_is_confirmed_at_once_and_its_trend_told(graph: Any) -> None:
     graph.wait(lambda: len(monitor.trend) == 4)
     trend = Table.from_msg(monitor.trend[-1])
     assert trend.values[:, 0].tolist() == [1.25, 2.0, 3.0, 4.0]
-    told = [
-        status
-        for message in graph.diagnostics
-        for status in message.status
-        if status.name.endswith("bus cable")
-    ]
-    assert told[0].level == DiagnosticStatus.OK
-    assert told[1].level == DiagnosticStatus.WARN
-    assert told[1].message.startswith("bad splice in car 2 at 60.")
+    told = graph.told("bus cable")
+    assert told[0][0] == DiagnosticStatus.OK
+    assert told[1][0] == DiagnosticStatus.WARN
+    assert told[1][1].startswith("bad splice in car 2 at 60.")
 
 
 def test_what_is_no_trace_is_not_interpreted(graph: Any) -> None:

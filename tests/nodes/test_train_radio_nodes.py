@@ -284,7 +284,7 @@ def test_a_radio_changes_to_a_base_station_that_is_clearly_better(graph: Any, pl
     for tick in range(12, 16):
         assert radio.hears(tick, {}) == ()
     assert (radio.figures["channel"], radio.figures["beacon_snr"]) == (other, 0.0)
-    told = [s.message for m in graph.diagnostics for s in m.status if s.name.endswith(": radio")]
+    told = [message for _, message in graph.told(": radio")]
     assert told == ["hears a base station", "hears no base station"]
 
 

@@ -7,7 +7,14 @@ from typing import Any
 
 import pytest
 
-from rail_msgs_py.delivery import LocalDelivery, LocalReader, ViewDecoder, serialised, view_reader
+from rail_msgs_py.delivery import (
+    Listener,
+    LocalDelivery,
+    LocalReader,
+    ViewDecoder,
+    serialised,
+    view_reader,
+)
 
 
 class Counted:
@@ -37,6 +44,20 @@ def delivery() -> LocalDelivery:
     return LocalDelivery()
 
 
+def reader(
+    node: object,
+    take_raw: Callable[[bytes], None],
+    take_view: Callable[[Any], None] | None = None,
+    fail: Callable[[Exception], None] | None = None,
+) -> LocalReader:
+    """Reader that lets nothing go wrong unseen."""
+
+    def failed(error: Exception) -> None:
+        raise AssertionError from error
+
+    return LocalReader(node, fail or failed, take_raw, take_view)
+
+
 def never() -> None:
     raise AssertionError("nobody outside sends to it")
 
@@ -44,10 +65,10 @@ def never() -> None:
 def test_readers_get_a_message_in_the_order_they_came(delivery: LocalDelivery) -> None:
     got: list[tuple[str, bytes]] = []
     for name in ("b", "a", "c"):
-        delivery.read("/t", LocalReader(name, lambda raw, n=name: got.append((n, raw))), never)
+        delivery.read("/t", reader(name, lambda raw, n=name: got.append((n, raw))), never)
     line = delivery.line("/t")
-    delivery.put(line, b"1", None)
-    delivery.put(line, b"2", None)
+    delivery.put(line, b"1", b"1")
+    delivery.put(line, b"2", b"2")
     assert not got  # the sender's callback returns first
     delivery.run()
     assert got == [(name, raw) for raw in (b"1", b"2") for name in ("b", "a", "c")]
@@ -56,12 +77,12 @@ def test_readers_get_a_message_in_the_order_they_came(delivery: LocalDelivery) -
 def test_a_view_travels_as_it_is_and_is_serialised_once_for_all(delivery: LocalDelivery) -> None:
     views: list[Any] = []
     raws: list[bytes] = []
-    for reader in (
-        LocalReader("x", raws.append, views.append),
-        LocalReader("y", raws.append),
-        LocalReader("z", raws.append),
+    for each in (
+        reader("x", raws.append, views.append),
+        reader("y", raws.append),
+        reader("z", raws.append),
     ):
-        delivery.read("/t", reader, never)
+        delivery.read("/t", each, never)
     view = Counted()
     delivery.put(delivery.line("/t"), view, None)
     delivery.run()
@@ -79,14 +100,14 @@ def test_what_a_reader_sends_comes_after_what_waits(delivery: LocalDelivery) -> 
 
     def first(raw: bytes) -> None:
         order.append(raw)
-        delivery.put(delivery.line("/answer"), b"answer", None)
+        delivery.put(delivery.line("/answer"), b"answer", b"answer")
         delivery.run()  # as a callback would that is called by the executor: no recursion
         order.append(b"returned")
 
-    delivery.read("/t", LocalReader("x", first), never)
-    delivery.read("/t", LocalReader("y", order.append), never)
-    delivery.read("/answer", LocalReader("x", order.append), never)
-    delivery.put(delivery.line("/t"), b"asked", None)
+    delivery.read("/t", reader("x", first), never)
+    delivery.read("/t", reader("y", order.append), never)
+    delivery.read("/answer", reader("x", order.append), never)
+    delivery.put(delivery.line("/t"), b"asked", b"asked")
     delivery.run()
     assert order == [b"asked", b"returned", b"asked", b"answer"]
 
@@ -94,36 +115,47 @@ def test_what_a_reader_sends_comes_after_what_waits(delivery: LocalDelivery) -> 
 def test_only_what_nobody_here_sends_is_subscribed_to(delivery: LocalDelivery) -> None:
     subscribed: list[str] = []
     for name in ("/here", "/outside"):
-        reader = LocalReader("x", lambda _: None)
-        delivery.read(name, reader, lambda n=name: subscribed.append(n))
+        one = reader("x", lambda _: None)
+        delivery.read(name, one, lambda n=name: subscribed.append(n))
     delivery.line("/here").writers += 1
     delivery.settle(Tasks())
+    assert subscribed == ["/outside"]
+
+
+def test_who_comes_after_the_others_is_subscribed_at_once(delivery: LocalDelivery) -> None:
+    subscribed: list[str] = []
+    delivery.line("/here").writers += 1
+    delivery.settle(Tasks())
+    for name in ("/here", "/outside"):
+        one = reader("x", lambda _: None)
+        delivery.read(name, one, lambda n=name: subscribed.append(n))
     assert subscribed == ["/outside"]
 
 
 def test_a_node_that_is_taken_out_gets_nothing_any_longer(delivery: LocalDelivery) -> None:
     got: list[str] = []
     for name in ("dead", "alive"):
-        delivery.read("/t", LocalReader(name, lambda _, n=name: got.append(n)), never)
-    delivery.put(delivery.line("/t"), b"under way", None)
+        delivery.read("/t", reader(name, lambda _, n=name: got.append(n)), never)
+    delivery.put(delivery.line("/t"), b"under way", b"under way")
     delivery.remove("dead")
-    delivery.put(delivery.line("/t"), b"later", None)
+    delivery.put(delivery.line("/t"), b"later", b"later")
     delivery.run()
     assert got == ["alive", "alive"]
 
 
 def test_endless_work_is_done_in_turns(delivery: LocalDelivery) -> None:
     tasks = Tasks()
+    delivery.line("/t").writers += 1
     delivery.settle(tasks)
     seen = 0
 
     def again(raw: bytes) -> None:
         nonlocal seen
         seen += 1
-        delivery.put(delivery.line("/t"), raw, None)
+        delivery.put(delivery.line("/t"), raw, raw)
 
-    delivery.read("/t", LocalReader("x", again), never)
-    delivery.put(delivery.line("/t"), b"", None)
+    delivery.read("/t", reader("x", again), never)
+    delivery.put(delivery.line("/t"), b"", b"")
     delivery.run()
     assert tasks.waiting == [delivery.run]  # the executor has its turn, and comes back
     before = seen
@@ -132,20 +164,43 @@ def test_endless_work_is_done_in_turns(delivery: LocalDelivery) -> None:
 
 
 def test_a_reader_that_raises_does_not_stop_the_others(delivery: LocalDelivery) -> None:
-    tasks = Tasks()
-    delivery.settle(tasks)
     got: list[bytes] = []
+    failed: list[Exception] = []
 
     def broken(raw: bytes) -> None:
         raise RuntimeError(raw)
 
-    delivery.read("/t", LocalReader("x", broken), never)
-    delivery.read("/t", LocalReader("y", got.append), never)
-    delivery.put(delivery.line("/t"), b"1", None)
-    with pytest.raises(RuntimeError):
-        delivery.run()
-    tasks.waiting.pop()()
+    delivery.read("/t", reader("x", broken, fail=failed.append), never)
+    delivery.read("/t", reader("y", got.append), never)
+    delivery.put(delivery.line("/t"), b"1", b"1")
+    delivery.run()
+    assert [str(error) for error in failed] == ["b'1'"]
     assert got == [b"1"]
+
+
+def test_a_process_hears_a_topic_of_many_once_for_all_its_nodes(delivery: LocalDelivery) -> None:
+    heard: list[tuple[str, str]] = []
+    ears: list[tuple[str, Callable[[Any], None]]] = []
+    for name in ("first", "second", "third"):
+        delivery.listen(
+            "/failed",
+            Listener(
+                name,
+                lambda hear, n=name: ears.append((n, hear)),
+                lambda message, n=name: heard.append((n, message)),
+            ),
+        )
+    assert [name for name, _ in ears] == ["first"]
+    ears[0][1]("one")
+    assert heard == [(name, "one") for name in ("first", "second", "third")]
+    # One that does not have the subscription leaves, then the one that has it.
+    delivery.remove("second")
+    assert len(ears) == 1
+    delivery.remove("first")
+    assert [name for name, _ in ears] == ["first", "third"]
+    heard.clear()
+    ears[1][1]("two")
+    assert heard == [("third", "two")]
 
 
 def test_decoders_say_whether_they_take_views() -> None:

@@ -81,6 +81,8 @@ class LocalReader:
     ----------
     node : node
         Whose it is.
+    fail : callable
+        Told of what a callback raises.
     take_raw : callable
         Takes serialised messages.
     take_view : callable, optional
@@ -88,6 +90,7 @@ class LocalReader:
     """
 
     node: Any
+    fail: Callable[[Exception], None]
     take_raw: Callable[[bytes], None]
     take_view: Callable[[Any], None] | None = None
 
@@ -100,12 +103,59 @@ class Line:
     readers: list[LocalReader] = field(default_factory=list)
 
 
+@dataclass(frozen=True, eq=False)
+class Listener:
+    """A node that listens to a topic of many publishers.
+
+    Parameters
+    ----------
+    node : node
+    subscribe : callable of a callback
+        Makes its subscription, should it be the one that has it.
+    take : callable
+        Takes messages.
+    """
+
+    node: Any
+    subscribe: Callable[[Callable[[Any], None]], None]
+    take: Callable[[Any], None]
+
+
+class Ear:
+    """The one subscription of a process to a topic, that of the first of its listeners.
+
+    Many nodes publish on it: that each of them heard each of the others by itself would take the
+    square of their number in memory and in time.
+    """
+
+    def __init__(self) -> None:
+        self._listeners: list[Listener] = []
+
+    def add(self, listener: Listener) -> None:
+        """Tell one more listener."""
+        self._listeners.append(listener)
+        if len(self._listeners) == 1:
+            listener.subscribe(self._hear)
+
+    def remove(self, node: Any) -> None:
+        """Tell a node no longer; if the subscription was its own, the next one makes another."""
+        first = self._listeners[:1]
+        self._listeners = [each for each in self._listeners if each.node is not node]
+        if self._listeners and self._listeners[:1] != first:
+            self._listeners[0].subscribe(self._hear)
+
+    def _hear(self, message: Any) -> None:
+        for listener in self._listeners:
+            listener.take(message)
+
+
 class LocalDelivery:
     """Hands the messages of one process from node to node."""
 
     def __init__(self) -> None:
+        self._ears: dict[str, Ear] = {}
         self._lines: dict[str, Line] = {}
-        self._queue: deque[tuple[Callable[[Any], None], Any]] = deque()
+        self._queue: deque[tuple[Callable[[Any], None], Any, LocalReader]] = deque()
         self._under_way = False
         self._executor: Any = None
         self._unsettled: list[tuple[Line, Callable[[], None]]] = []
@@ -123,8 +173,15 @@ class LocalDelivery:
         """Add a reader; ``subscribe`` connects it to the outside if nobody here sends to it."""
         line = self.line(name)
         line.readers.append(reader)
-        self._unsettled.append((line, subscribe))
+        if self._executor is None:
+            self._unsettled.append((line, subscribe))
+        elif not line.writers:
+            subscribe()
         return line
+
+    def listen(self, name: str, listener: Listener) -> None:
+        """Listen to a topic of many publishers, by the one subscription of the process to it."""
+        self._ears.setdefault(name, Ear()).add(listener)
 
     def settle(self, executor: Any) -> None:
         """All nodes are made: subscribe outside to what nobody here sends.
@@ -149,27 +206,27 @@ class LocalDelivery:
             Its serialised form, if there is one already.
         """
         put = self._queue.append
-        if isinstance(message, bytes):
+        if message is raw:
             for reader in line.readers:
-                put((reader.take_raw, message))
+                put((reader.take_raw, raw, reader))
             return
         for reader in line.readers:
             if reader.take_view is not None:
-                put((reader.take_view, message))
+                put((reader.take_view, message, reader))
                 continue
             if raw is None:
-                raw = message.to_cdr()
-            put((reader.take_raw, raw))
+                raw = serialised(message)
+            put((reader.take_raw, raw, reader))
 
     def remove(self, node: Any) -> None:
         """Hand nothing any longer to a node."""
-        gone: set[Any] = set()
+        for ear in self._ears.values():
+            ear.remove(node)
         for line in self._lines.values():
-            for reader in line.readers:
-                if reader.node is node:
-                    gone.update((reader.take_raw, reader.take_view))
             line.readers = [reader for reader in line.readers if reader.node is not node]
-        self._queue = deque(entry for entry in self._queue if entry[0] not in gone)
+        waiting = [entry for entry in self._queue if entry[2].node is not node]
+        self._queue.clear()
+        self._queue.extend(waiting)
 
     def run(self) -> None:
         """Hand over what waits, and what comes of it; long work is done in turns."""
@@ -178,14 +235,18 @@ class LocalDelivery:
         self._under_way = True
         until_s = time.monotonic() + _TURN_S
         handed_over = 0
+        queue = self._queue
         try:
-            while self._queue:
-                take, message = self._queue.popleft()
-                take(message)
+            while queue:
+                take, message, reader = queue.popleft()
+                try:
+                    take(message)
+                except Exception as error:
+                    reader.fail(error)
                 handed_over += 1
                 if handed_over % _LOOK_EVERY == 0 and time.monotonic() > until_s:
                     break
         finally:
             self._under_way = False
-            if self._queue and self._executor is not None:
+            if queue and self._executor is not None:
                 self._executor.create_task(self.run)

@@ -27,23 +27,29 @@ class TickInbox(Generic[Item]):
         self._awaited = set(self.ports)
         self._ticks: dict[int, dict[str, Item]] = {}
         self._first: dict[str, Item] | None = None
+        #: How many awaited ports the earliest tick lacks.
+        self._lacking = 0
         self._latest_taken_ns = -1
 
     def open(self, port: str) -> None:
         """Wait for one more port from now on."""
         self.ports = tuple(sorted({*self.ports, port}))
         self._awaited.add(port)
+        self._find_first()
 
     def put(self, stamp_ns: int, port: str, item: Item) -> None:
         """Add an item; one of a tick already taken only shows that its port is alive again."""
         if port not in self._awaited:
             self._awaited.add(port)
+            self._find_first()
         items = self._ticks.get(stamp_ns)
         if items is None:
             if stamp_ns <= self._latest_taken_ns:
                 return
             items = self._ticks[stamp_ns] = {}
             self._find_first()
+        if items is self._first and port not in items:
+            self._lacking -= 1
         items[port] = item
 
     @property
@@ -60,13 +66,10 @@ class TickInbox(Generic[Item]):
     def complete(self) -> bool:
         """Whether nothing more can come for the earliest tick."""
         items = self._first
-        if items is None:
+        if items is None or self._lacking == 0:
+            return items is not None
+        if len(self._ticks) == 1:
             return False
-        if len(items) < len(self._awaited):
-            if len(self._ticks) == 1:
-                return False
-        elif self._awaited <= items.keys():
-            return True
         missing = self._awaited - items.keys()
         return all(any(port in items for items in self._ticks.values()) for port in missing)
 
@@ -83,6 +86,7 @@ class TickInbox(Generic[Item]):
     def drop(self, ports: Iterable[str]) -> None:
         """Wait no longer for these ports."""
         self._awaited.difference_update(ports)
+        self._find_first()
 
     def close(self, stamp_ns: int) -> None:
         """Forget a tick and those before it: what comes late only shows that its port is alive."""
@@ -112,9 +116,10 @@ class TickInbox(Generic[Item]):
     def reset(self) -> None:
         """Forget everything, as when simulated time jumps back."""
         self._ticks.clear()
-        self._first = None
         self._latest_taken_ns = -1
         self._awaited = set(self.ports)
+        self._find_first()
 
     def _find_first(self) -> None:
         self._first = self._ticks[min(self._ticks)] if self._ticks else None
+        self._lacking = len(self._awaited - (self._first or {}).keys())

@@ -5,35 +5,29 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
-from rclpy.serialization import serialize_message
-from std_msgs.msg import String
 
-from rail_msgs_py.topics.tick import CLOCK, DIAGNOSTICS, NO_READER, NO_SENDER, READY, WAITING
+from rail_msgs_py.topics.tick import CLOCK, NO_READER, NO_SENDER
 from rail_msgs_py.topics.topic import Topic
 
-from .delivery import Decoder, LocalDelivery, LocalReader, Send, view_reader
+from .delivery import Decoder, Listener, LocalDelivery, LocalReader, Send, view_reader
+from .health import HealthMixin
 from .parameters import overrides
 from .publisher import CorridorPublisher
-from .stamps import NANOSECONDS, clock_to_cdr
+from .readiness import ReadinessMixin
 from .table import TableWriter
 
-READY_POLL_S = 0.05
-#: Wall time without a new connection after which a node says what it waits for.
-STALLED_S = 1.0
 #: Node that reads the run for its report.
 REPORT_NAME = "report"
-# Of a serialised DiagnosticArray: what stands before the name of its frame.
-_STAMP_BYTES = 12
 #: Which services a node offers beside its topics: all, none, or the lifecycle's alone.
 Services = bool | Literal["switches"]
 
@@ -60,49 +54,23 @@ def node_arguments(
     }
 
 
-class Connection(NamedTuple):
-    """What a node needs before the first tick.
-
-    Parameters
-    ----------
-    made : callable
-        Whether it is there.
-    topic : str
-        Name of the topic; empty if it is something else.
-    lacks : str
-        What is missing as long as it is not there.
-    """
-
-    made: Callable[[], bool]
-    topic: str = ""
-    lacks: str = ""
-
-
-# To the type checker the mixin has what rclpy's nodes have; at run time it stands before them.
-_RosNode: Any = Node if TYPE_CHECKING else object
-
-
-class CorridorMixin(_RosNode):  # type: ignore[misc]
+class CorridorMixin(ReadinessMixin, HealthMixin):
     """Streams, readiness, failures and health on top of an rclpy node."""
 
     def init_corridor(self) -> None:
         """Create what every node has; call once after the node's own constructor."""
-        self._connections: list[Connection] = []
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._publish_health = self.publisher(DIAGNOSTICS).send
-        self._health: dict[str, DiagnosticStatus] = {}
-        self._health_cdr: bytes | None = None
-        self._now_ns = 0
-        self._second = -1
-        self._ready_publisher: Any = None
-        self._waiting_publisher: Any = None
-        self._lacked: tuple[tuple[str, str], ...] = ()
-        self._ready_timer: Any = None
+        self.init_readiness()
+        self.init_health()
 
     @property
     def _delivery(self) -> LocalDelivery | None:
         """Delivery to the other nodes of the process, if it has one."""
         return getattr(self.context, "delivery", None)
+
+    def _delivery_of(self, topic: Topic) -> LocalDelivery | None:
+        """Delivery of a topic that only one node sends."""
+        return None if topic.shared else self._delivery
 
     def name_of(self, topic: Topic, **parts: object) -> str:
         """Name of a topic as this node asks for it, before its remapping rules."""
@@ -114,7 +82,7 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         if publisher.topic_name in getattr(self.context, "report_reads", ()):
             self._await_report(publisher)
         tap = getattr(self.context, "tap", None)
-        return CorridorPublisher(topic, publisher, tap, self._delivery)
+        return CorridorPublisher(topic, publisher, tap, self._delivery_of(topic))
 
     def _await_report(self, publisher: Any) -> None:
         """Wait until what is published is heard by the report, as by all readers known here."""
@@ -211,7 +179,7 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         take_view: Callable[[Any], None] | None,
         parts: Mapping[str, object],
     ) -> None:
-        asked, delivery = self.name_of(topic, **parts), self._delivery
+        asked, delivery = self.name_of(topic, **parts), self._delivery_of(topic)
         name = self.resolve_topic_name(asked)
 
         def subscribe() -> None:
@@ -221,10 +189,7 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
             subscribe()
             self.await_connection(lambda: self.count_publishers(name) > 0, name, NO_SENDER)
             return
-        safely = self._safely
-        reader = LocalReader(
-            self, safely(take_raw), None if take_view is None else safely(take_view)
-        )
+        reader = LocalReader(self, self._failed_callback, take_raw, take_view)
         line = delivery.read(name, reader, subscribe)
         self.await_connection(
             lambda: line.writers > 0 or self.count_publishers(name) > 0, name, NO_SENDER
@@ -232,8 +197,16 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         """Subscribe to messages of a topic that nothing waits for."""
-        name = self.name_of(topic, **parts)
-        self.create_subscription(topic.type, name, self.guarded(callback), topic.qos)
+        name, delivery = self.name_of(topic, **parts), self._delivery
+
+        def subscribe(receive: Callable[[Any], None]) -> None:
+            self.create_subscription(topic.type, name, self.guarded(receive), topic.qos)
+
+        if delivery is None:
+            subscribe(callback)
+        else:
+            listener = Listener(self, subscribe, self._safely(callback))
+            delivery.listen(self.resolve_topic_name(name), listener)
 
     def guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
         """Callback for the executor; what it sends within the process is handed over after it.
@@ -252,15 +225,19 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
         return run
 
     def _safely(self, callback: Callable[..., None]) -> Callable[..., None]:
+        """Callback whose exceptions are this node's."""
 
         def run(*arguments: Any) -> None:
             try:
                 callback(*arguments)
             except Exception as error:
-                self.get_logger().error(traceback.format_exc())
-                self.report(DiagnosticStatus.ERROR, "software", f"{type(error).__name__}: {error}")
+                self._failed_callback(error)
 
         return run
+
+    def _failed_callback(self, error: Exception) -> None:
+        self.get_logger().error("".join(traceback.format_exception(error)))
+        self.report(DiagnosticStatus.ERROR, "software", f"{type(error).__name__}: {error}")
 
     def every(self, period_s: float, callback: Callable[[], None]) -> Any:
         """Timer on the steady wall clock."""
@@ -269,125 +246,6 @@ class CorridorMixin(_RosNode):  # type: ignore[misc]
     def steady_s(self) -> float:
         """Steady wall-clock time, that of `every`; without the objects of rclpy around it."""
         return time.monotonic()
-
-    def await_connection(
-        self, condition: Callable[[], bool], topic: str = "", lacks: str = ""
-    ) -> None:
-        """Add a condition to those that `announce_when_connected` waits for; see `Connection`."""
-        self._connections.append(Connection(condition, topic, lacks))
-
-    def lacking(self) -> list[Connection]:
-        """Connections that are not there yet."""
-        self._connections = [one for one in self._connections if not one.made()]
-        return list(self._connections)
-
-    def announce_when_connected(self, condition: Callable[[], bool] | None = None) -> None:
-        """Publish the node's name on ``/ready`` once all its streams have a counterpart.
-
-        What it waits for in vain is published on ``/waiting``: the world knows whether anybody
-        is left who could be that counterpart.
-        """
-        if condition is not None:
-            self.await_connection(condition)
-        self._ready_publisher = self.publisher(READY)
-
-        since_s = self.steady_s()
-
-        def poll() -> None:
-            nonlocal since_s
-            while self._connections and self._connections[-1].made():
-                self._connections.pop()
-                since_s = self.steady_s()
-            if not self._connections:
-                self._ready_publisher.publish(String(data=self.get_fully_qualified_name()))
-                self._ready_timer.cancel()
-            elif self.steady_s() - since_s > STALLED_S:
-                self._tell_what_is_lacking()
-                since_s = self.steady_s()
-
-        self._ready_timer = self.every(READY_POLL_S, poll)
-
-    def _tell_what_is_lacking(self) -> None:
-        """Publish on ``/waiting`` what has no counterpart, if that is something new."""
-        lacking = tuple(sorted({(one.topic, one.lacks) for one in self.lacking()}))
-        if not lacking or lacking == self._lacked:
-            return
-        if self._waiting_publisher is None:
-            self._waiting_publisher = self.publisher(WAITING)
-        self._lacked = lacking
-        name = self.get_fully_qualified_name()
-        self._waiting_publisher.publish(
-            DiagnosticStatus(
-                level=DiagnosticStatus.WARN,
-                name=name,
-                message=f"waits for {len(lacking)} connections",
-                hardware_id=name,
-                values=[KeyValue(key=topic, value=lacks) for topic, lacks in lacking],
-            )
-        )
-
-    def report(
-        self,
-        level: bytes,
-        what: str,
-        message: str,
-        values: Iterable[tuple[str, str]] = (),
-        stamp_ns: int | None = None,
-    ) -> None:
-        """Publish the health of one aspect of the node, if it changed.
-
-        Without a stamp it is of the tick at hand.
-        """
-        before = self._health.get(what)
-        if before is not None and (before.level, before.message) == (level, message):
-            return
-        status = self._status(what, level, message, values)
-        self._health[what] = status
-        self._health_cdr = None
-        now_ns = self._now_ns if stamp_ns is None else stamp_ns
-        self._tell_health(now_ns, _without_stamp([status]))
-
-    def at_tick(self, stamp_ns: int) -> None:
-        """Take the simulated time; tell the health of the node in the first tick of each second."""
-        self._now_ns = stamp_ns
-        second = stamp_ns // NANOSECONDS
-        if second == self._second:
-            return
-        self._second = second
-        if self._health_cdr is None:
-            alive = self._status("node", DiagnosticStatus.OK, "running")
-            self._health_cdr = _without_stamp([*self._health.values()] or [alive])
-        self._tell_health(stamp_ns, self._health_cdr)
-
-    def _keeping_time(self, callback: Callable[[int, Any], None]) -> Callable[[int, Any], None]:
-        """Callback of what begins a tick."""
-        at_tick = self.at_tick
-
-        def run(stamp_ns: int, item: Any) -> None:
-            at_tick(stamp_ns)
-            callback(stamp_ns, item)
-
-        return run
-
-    def _status(
-        self, what: str, level: bytes, message: str, values: Iterable[tuple[str, str]] = ()
-    ) -> DiagnosticStatus:
-        name = self.get_fully_qualified_name()
-        return DiagnosticStatus(
-            level=level,
-            name=f"{name}: {what}",
-            message=message,
-            hardware_id=name,
-            values=[KeyValue(key=key, value=value) for key, value in values],
-        )
-
-    def _tell_health(self, stamp_ns: int, without_stamp: bytes) -> None:
-        self._publish_health(clock_to_cdr(stamp_ns) + without_stamp)
-
-
-def _without_stamp(statuses: list[DiagnosticStatus]) -> bytes:
-    """Serialised ``DiagnosticArray`` without what `clock_to_cdr` writes before it."""
-    return bytes(serialize_message(DiagnosticArray(status=statuses))[_STAMP_BYTES:])
 
 
 class CorridorNode(CorridorMixin, Node):  # type: ignore[misc]

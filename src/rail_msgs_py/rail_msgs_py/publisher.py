@@ -9,7 +9,7 @@ from rclpy.serialization import serialize_message
 from rail_msgs_py.topics.qos import ESTIMATE, STREAM
 from rail_msgs_py.topics.topic import Topic
 
-from .delivery import Line, LocalDelivery, Send, Sendable, serialised
+from .delivery import LocalDelivery, Send, Sendable, serialised
 from .tap import Sink, Tap
 
 
@@ -34,40 +34,24 @@ class CorridorPublisher:
         self._publisher = publisher
         self._count = publisher.handle.get_subscription_count
         sink = None if tap is None else tap(topic, publisher.topic_name)
-        self._line: Line | None = None
-        if delivery is None:
-            send = self._sender(sink)
-        else:
-            self._line = line = delivery.line(publisher.topic_name)
-            line.writers += 1
-            # What is kept for those who come later is kept by the middleware.
-            selective = topic.qos is STREAM or topic.qos is ESTIMATE
-            send = self._local_sender(sink, delivery, line, selective=selective)
+        self._line = None if delivery is None else delivery.line(publisher.topic_name)
+        if self._line is not None:
+            self._line.writers += 1
         #: Sends a message, or its serialised form.
-        self.send: Send = send
+        self.send: Send = self._sender(topic, sink, delivery)
 
-    def _sender(self, sink: Sink | None) -> Send:
-        publish_raw = self._publisher.handle.publish_raw
-
-        def send(message: Sendable) -> None:
-            raw = serialised(message)
-            if sink is not None:
-                sink(raw)
-            publish_raw(raw)
-
-        return send
-
-    def _local_sender(
-        self, sink: Sink | None, delivery: LocalDelivery, line: Line, *, selective: bool
-    ) -> Send:
-        publish_raw, count, put = self._publisher.handle.publish_raw, self._count, delivery.put
+    def _sender(self, topic: Topic, sink: Sink | None, delivery: LocalDelivery | None) -> Send:
+        publish_raw, count, line = self._publisher.handle.publish_raw, self._count, self._line
+        put = None if delivery is None else delivery.put
+        # What is kept for those who come later is kept by the middleware.
+        selective = delivery is not None and (topic.qos is STREAM or topic.qos is ESTIMATE)
 
         def send(message: Sendable) -> None:
-            raw = message if isinstance(message, bytes) else None
+            raw = message if type(message) is bytes else None
             if sink is not None:
                 raw = serialised(message) if raw is None else raw
                 sink(raw)
-            if line.readers:
+            if put is not None and line is not None and line.readers:
                 put(line, message, raw)
             if not selective or count():
                 publish_raw(serialised(message) if raw is None else raw)

@@ -299,7 +299,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
     def _tick_over(self) -> None:
         self._begun_s = float("inf")
         self._inbox.close(self._tick * self._tick_ns)
-        wait_s = self._wait_s()
+        wait_s = max(self._wait_s(), 0.0 if self._inbox.awaits_anything else _UNANSWERED_S)
         if wait_s <= 0.0:
             self._next_tick()
             return
@@ -318,10 +318,10 @@ class WorldNode(TickNode[WorldParameters], name="world"):
 
     def _wait_s(self) -> float:
         """Wall time until the next tick may start."""
-        wait_s = 0.0 if self._inbox.awaits_anything else _UNANSWERED_S
+        wait_s = 0.0
         if self._p.rate > 0.0:
             due_s = self._started_s + (self._tick + 1) * self._tick_ns * 1e-9 / self._p.rate
-            wait_s = max(wait_s, due_s - self.steady_s())
+            wait_s = due_s - self.steady_s()
         ahead = (self._tick + 1) * self._tick_ns - self._observed_ns
         if self._p.observed and ahead > OBSERVER_WINDOW_TICKS * self._tick_ns:
             wait_s = max(wait_s, 0.005)

@@ -16,7 +16,7 @@ from rail_corridor.equipment.train_radio.nodes import CBTC_MEDIUM
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.loading.overrides import Overrides
 from rail_corridor.plan.plan import MOST_PROCESSES, WORLD, Placement, Plan, make_plan
-from rail_corridor.run.launcher import default_placement
+from rail_corridor.run.options import default_placement
 from rail_msgs_py.topics.train_radio import BACKBONE
 from rail_world.ranging.description import RadioDescription
 from rail_world.world_file import read_world_file

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from rail_signals.train_radio.mimo_fading import MimoFading
 from rail_signals.train_radio.pilot_estimation import (
     MAX_SNR,
-    PilotPattern,
     WienerEstimator,
     wiener_estimator,
 )
+from rail_signals.train_radio.pilot_pattern import PilotPattern
 
 
 def normal(rng: np.random.Generator, *shape: int) -> np.ndarray:

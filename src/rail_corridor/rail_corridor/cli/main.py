@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 # One thread for linear algebra: two cores are shared by many nodes, and the bits of a sum must
 # not depend on how many threads computed it. Has to be set before NumPy is loaded.
@@ -28,9 +28,8 @@ from .usage import (
 )
 from .workshop import add_to as add_workshop
 
-Part = Literal["wayside", "onboard", "report"]
-
 if TYPE_CHECKING:
+    from rail_corridor.plan.plan import Part
     from rail_corridor.scenario.model import Scenario
 
 app = typer.Typer(
@@ -41,7 +40,7 @@ app = typer.Typer(
 )
 
 _PLACEMENTS: tuple[Literal["one", "site", "node"], ...] = ("one", "site", "node")
-_PARTS: tuple[Part, ...] = get_args(Part)
+_PARTS: tuple[Part, ...] = ("wayside", "onboard", "report")
 
 SeedOption = Annotated[
     int | None, typer.Option("--seed", help="Seed of every random draw.", metavar="N")
@@ -182,8 +181,8 @@ def run(
 
     from rich.console import Console
 
-    from rail_corridor.run.launcher import RunOptions
     from rail_corridor.run.launcher import run as run_corridor
+    from rail_corridor.run.options import RunOptions
 
     options = RunOptions(
         rate,

@@ -10,7 +10,7 @@ from rich.console import Console
 from rail_corridor.errors import InputError
 from rail_corridor.plan.parameter_files import COMMANDS, module_of, write_plan
 from rail_corridor.plan.plan import Plan, make_plan
-from rail_corridor.run.launcher import default_placement
+from rail_corridor.run.options import default_placement
 from rail_corridor.scenario.model import Scenario
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
 from rail_corridor.equipment.registry import kind_of
@@ -74,7 +75,10 @@ class ExternalTrafficRecorder(CorridorNode):
         """Look for topics of the nodes that have said that they are ready."""
         for external_node in [name for name in self._polls if name in self._present]:
             namespace, _, name = external_node.rpartition("/")
-            published = self.get_publisher_names_and_types_by_node(name, namespace or "/")
+            try:
+                published = self.get_publisher_names_and_types_by_node(name, namespace or "/")
+            except NodeNameNonExistentError:  # heard before the graph shows it
+                continue
             new = [
                 (topic, types[0]) for topic, types in published if topic not in self._known_topics
             ]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.equipment.registry import node_kinds
+from rail_signals.compiled import preload_kernels
 
 if TYPE_CHECKING:
     from rail_msgs_py.tap import Tap
@@ -54,6 +55,7 @@ def make_nodes(
         if until():
             break
         nodes.append(make_node(spec, context, services))
+    preload_kernels()
     gc.collect()
     gc.freeze()
     return nodes

@@ -86,6 +86,13 @@ def check_kills(
         raise InputError(reason, field=_OPTION, value=kill.node)
 
 
+def killed_nodes(kills: Iterable[Kill], processes: Iterable[Sequence[NodeSpec]]) -> set[str]:
+    """Full names of what goes with kills: also what shares a process of its own with it."""
+    killed = {kill.node for kill in kills}
+    groups = [{spec.name for spec in specs} for specs in processes]
+    return killed.union(*(names for names in groups if names & killed))
+
+
 class FaultInjector:
     """Kills what is due.
 

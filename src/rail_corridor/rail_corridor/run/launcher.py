@@ -8,29 +8,18 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import Progress, TaskID
 
 from rail_corridor.equipment.registry import node_kinds
-from rail_corridor.errors import InputError
 from rail_corridor.loading.scenario_files import files_of
 from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.middleware.domain import sole_corridor
-from rail_corridor.plan.plan import (
-    REPORT,
-    WORLD,
-    Part,
-    Placement,
-    Plan,
-    check_external,
-    make_plan,
-)
+from rail_corridor.plan.plan import REPORT, WORLD, Plan, check_external, make_plan
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
 from rail_corridor.report.intake import names_read
@@ -40,17 +29,18 @@ from rail_corridor.scenario.model import Scenario
 from .external_traffic import FULL_NAME as EXTERNAL_TRAFFIC
 from .external_traffic import ExternalTrafficRecorder
 from .host import destroy_nodes, make_context, make_nodes, run_nodes
-from .kills import FaultInjector, Kill, check_kills
+from .kernels import compile_before_the_first_run
+from .kills import FaultInjector, check_kills, killed_nodes
+from .options import RunOptions, check_recording, default_placement
 from .parameter_services import ParameterServicesOnDemand
 from .processes import ProcessGroup, remove_orphaned_segments
+from .progress import progress_of
 
 if TYPE_CHECKING:
     from rail_corridor.equipment.node_spec import NodeSpec
 
     from .run_recording import RunRecording
 
-#: More processes than this to a core cost more than they show.
-MOST_PROCESSES_PER_CORE = 8
 #: Wall time to read what is still under way when the world has finished.
 DRAIN_S = 20.0
 #: ... and where some of it will not come, as its sender has failed or the run was stopped.
@@ -61,30 +51,6 @@ LEAVE_S = 0.5
 _LOOK_S = 0.5
 #: Exit codes: the other half of a corridor has ended first; nodes have failed.
 HALF_GONE, NODES_FAILED = 3, 4
-
-
-@dataclass(frozen=True)
-class RunOptions:
-    """How to run a scenario, apart from what is in it."""
-
-    rate: float = 0.0
-    placement: Placement | None = None
-    only: Part | None = None
-    report: Path | None = None
-    timeout_s: float = 30.0
-    external: tuple[str, ...] = ()
-    kills: tuple[Kill, ...] = ()
-    record: Path | None = None
-    switches: bool = False
-    allow_failures: bool = False
-    #: Of a run in one process: is given its nodes and their context before they are spun. The
-    #: report is then not printed.
-    probe: Callable[[list[Any], Any], None] | None = None
-
-    @property
-    def with_external_nodes(self) -> bool:
-        """Whether somebody else runs some of the nodes."""
-        return bool(self.external or self.only)
 
 
 def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
@@ -98,7 +64,7 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
         signal that ended it.
     """
     if options.record is not None:
-        _check_recording(options.record, options.only)
+        check_recording(options.record, options.only)
     discover_on("all" if options.only else "this")
     directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
     try:
@@ -114,6 +80,7 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
             observers=(REPORT, *external_nodes),
         )
         check_external(plan, options.external)
+        compile_before_the_first_run(console)
         with sole_corridor(options.only):
             launched = _LaunchedRun(scenario, options, plan, console)
             code = launched.run()
@@ -124,23 +91,6 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
         sys.stderr.flush()
         os._exit(code)
     return code
-
-
-def _check_recording(path: Path, only: str | None) -> None:
-    """Raise InputError for a recording that cannot be made."""
-    if path.suffix != ".mcap":
-        reason = "the name of a recording ends in .mcap"
-    elif only == "onboard":
-        reason = "record where the world runs, with --only wayside"
-    else:
-        return
-    raise InputError(reason, field="--record", value=str(path))
-
-
-def default_placement(plan: Plan, cores: int | None = None) -> Placement:
-    """A process per site and train, unless they are too many for the cores: then one is faster."""
-    most = MOST_PROCESSES_PER_CORE * (cores or os.cpu_count() or 1)
-    return "site" if len({spec.site for spec in plan.nodes}) <= most else "one"
 
 
 class _LaunchedRun:
@@ -279,14 +229,7 @@ class _LaunchedRun:
             self._options.probe(nodes, context)
         context.delivery.settle(executor)
         self._arrange_kills(executor, nodes)
-        with Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=None),
-            TextColumn("{task.completed:.1f} of {task.total:.0f} s  {task.fields[speed]}"),
-            TimeRemainingColumn(),
-            console=self._console,
-            transient=True,
-        ) as self._progress:
+        with progress_of(self._console) as self._progress:
             total_s = self._plan.ticks * self._plan.tick_s
             self._bar = self._progress.add_task("connecting", total=total_s, speed="")
             if not self._signal:
@@ -434,12 +377,10 @@ class _LaunchedRun:
                 self._console.print(f"report written to {self._options.report}")
         if self._recording is not None and not self._recording_failed:
             self._console.print(f"recorded to {self._options.record}")
-        if self._world_failed:
+        if self._world_failed or (self._recording_failed and not self._signal):
             return 1
         if self._signal:
             return 128 + self._signal
-        if self._recording_failed:
-            return 1
         if self._half_gone:
             return HALF_GONE
         return NODES_FAILED if self._unplanned_failures() else 0
@@ -448,10 +389,7 @@ class _LaunchedRun:
         """Whether nodes failed that were not meant to; says so, unless that is allowed."""
         if self._observer is None or self._options.allow_failures:
             return False
-        killed = {kill.node for kill in self._options.kills}
-        if not self._here:  # with a process all of its nodes are
-            groups = ({spec.name for spec in specs} for specs in self._groups.values())
-            killed |= {name for names in groups if names & killed for name in names}
+        killed = killed_nodes(self._options.kills, () if self._here else self._groups.values())
         failed = [one["node"] for one in self._observer.failures if one["node"] not in killed]
         if failed:
             line = f"not meant to fail: {', '.join(failed)} (--allow-failures for exit code 0)"

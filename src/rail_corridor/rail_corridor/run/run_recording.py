@@ -16,14 +16,14 @@ from rail_corridor.recording.frames import Attachment, attachment_frame, metadat
 from rail_corridor.recording.pipe_tap import CLOSED, PipeTap
 from rail_corridor.recording.recorder import record
 from rail_msgs_py.message_definition import message_definition, type_name
-from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, READY
+from rail_msgs_py.topics.tick import TOPICS
 
 from .processes import ProcessGroup
 
 #: The process of the launcher itself, where the report is; no other has an empty name.
 LAUNCHER: Final = ""
 #: Topics on which every node publishes.
-SHARED: Final = (READY, FAILED, DIAGNOSTICS)
+SHARED: Final = tuple(topic for topic in TOPICS if topic.shared)
 _PIPE_BYTES: Final = 1024 * 1024
 #: Wall time after which a recorder that takes nothing is given up. The other processes wait for
 #: ever: the launcher ends them.

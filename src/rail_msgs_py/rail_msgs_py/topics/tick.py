@@ -55,6 +55,7 @@ READY: Final = Topic(
     "every node",
     "world",
     "Name of a node whose topics are all connected.",
+    shared=True,
 )
 #: What a stream lacks, on ``/waiting``.
 NO_SENDER: Final = "no sender"
@@ -67,6 +68,7 @@ WAITING: Final = Topic(
     "every node that is not connected for long",
     "world",
     "The topics that a node lacks a sender or a reader of before the first tick.",
+    shared=True,
 )
 FAILED: Final = Topic(
     "/failed",
@@ -76,6 +78,7 @@ FAILED: Final = Topic(
     "every node that waits for others, the report for the launcher",
     "every node that waits for others, the report",
     "A node that is not waited for any longer, and why.",
+    shared=True,
 )
 DIAGNOSTICS: Final = Topic(
     "/diagnostics",
@@ -85,6 +88,7 @@ DIAGNOSTICS: Final = Topic(
     "every node",
     "people, the report",
     "Health, published when it changes and in every simulated second (REP 107).",
+    shared=True,
 )
 
 #: In the order of the documentation.

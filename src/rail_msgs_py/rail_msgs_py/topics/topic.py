@@ -31,6 +31,8 @@ class Topic:
     awaited : bool
         Whether a node may wait for its reader before the first tick although it is not a stream: an
         estimate that other equipment acts on.
+    shared : bool
+        Whether nodes of several processes send on it. All of it then goes through the middleware.
     """
 
     pattern: str
@@ -43,6 +45,7 @@ class Topic:
     columns: tuple[str, ...] = ()
     below_owner: int = 1
     awaited: bool = False
+    shared: bool = False
 
     @cached_property
     def index(self) -> dict[str, int]:

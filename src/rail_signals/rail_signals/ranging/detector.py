@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
 from scipy.special import betainc, betaln
 
 
@@ -72,4 +71,6 @@ def detection_threshold(
         return math.log(max(bound, 1e-300)) - math.log(false_alarm)
 
     # The mean fraction L / M is below any threshold for less than one half.
+    from scipy.optimize import brentq  # a quarter of a second, and not for every start
+
     return float(brentq(excess, components / dimensions, 1 - 1e-12))

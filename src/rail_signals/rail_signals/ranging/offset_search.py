@@ -8,12 +8,12 @@ over the components, peak.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
-from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.arrays import FloatArray
 from rail_signals.phasors import cis
 
 from .fm_spectrum import FmSpectrum
@@ -32,11 +32,11 @@ _SEGMENT_CYCLES = 0.25
 
 
 class OffsetSearch:
-    """Search for the offset on a grid of half a cycle per burst, and its removal.
+    """Tables of the search for the offset on a grid of half a cycle per burst, and its removal.
 
-    Both work on rows of one period each: those of the burst, or weighted sums of them if
-    fewer than `MAX_TAPERS` do. The weights, `tapers`, are Slepian sequences (Slepian, Bell
-    System Technical Journal 57(5), 1978): the first of them hold every offset in the
+    Both (`burst_kernel`) work on rows of one period each: those of the burst, or weighted sums
+    of them if fewer than `MAX_TAPERS` do. The weights, `tapers`, are Slepian sequences (Slepian,
+    Bell System Technical Journal 57(5), 1978): the first of them hold every offset in the
     interval but for `TAPER_LOSS`, so that nothing more is needed of the burst.
 
     Interpolation follows Aboutanios and Mulgrew (IEEE Trans. Signal Processing 53(4),
@@ -68,130 +68,57 @@ class OffsetSearch:
                 f"max_offset_hz must stay below {limit_hz:g} Hz for periods of"
                 f" {period} samples, got {max_offset_hz:g}"
             )
-        self._period, self._periods = period, signal.samples // period
+        periods = signal.samples // period
         step_hz = 0.5 / signal.duration_s
         half = math.ceil(max_offset_hz / step_hz) + 1
-        grid_hz = step_hz * np.arange(-half, half + 1, dtype=np.float64)
+        grid_hz = step_hz * np.arange(half + 1, dtype=np.float64)
         self.width_hz = 2 * half * step_hz
         """Width of the interval searched [Hz]."""
         cycles_per_sample = grid_hz[-2] / rate_hz
-        self.tapers = _tapers(self._periods, cycles_per_sample * period)
+        self.tapers = _tapers(periods, cycles_per_sample * period)
         """Weights [tapers, periods] of the sums to make; None if the burst is better."""
         # Without sums, segments are several periods: the basis repeats with the period.
         repeats = 1
         if self.tapers is None:
-            repeats = _segment_periods(self._periods, max_offset_hz * period / rate_hz)
-        segments = self._periods // repeats
-        self._row = 2 * period * repeats
-        # Arrays, not numbers: these a ufunc takes without conversion.
-        self._arc = np.array(math.tan(math.pi / (2 * segments)))
-        self._arc_hz = np.array(segments / math.pi / signal.duration_s)
-        self._grid_hz = grid_hz[1:-1]
-        tables = _Tables.of(signal, components, grid_hz, repeats, self.tapers)
-        self._tables: dict[Any, _Tables] = {
-            np.dtype(kind): tables.astype(kind) for kind in (np.float32, np.float64)
-        }
-        self._component_count, self._grid_count = len(components.bins), len(grid_hz)
-        i, j = _factors(self._periods)
-        self._split = (i, i + j, i + j + _factors(period)[0])
-
-    def offset_hz(self, rows: RealArray) -> FloatArray:
-        """Carrier offset [Hz] of each of `rows` [batch, rows, 2 period] (see `fold`)."""
-        # Matrix products are stacked, one of fixed shape for each burst, so that their
-        # rounding does not depend on the batch.
-        _, basis, grid, _ = self._tables[rows.dtype]
-        batch, _, width = rows.shape
-        if width != self._row:
-            rows = rows.reshape(batch, -1 if batch else 1, self._row)
-        components = (rows @ basis).reshape(batch, grid.shape[1], self._component_count)
-        response = (grid @ components).reshape(batch, self._grid_count, 2 * self._component_count)
-        power = np.vecdot(response, response)
-        below, above = response[:, :-2], response[:, 2:]
-        total = above + below
-        quotient = (power[:, 2:] - power[:, :-2]) / np.vecdot(total, total)
-        offset_hz = np.arctan(quotient * self._arc) * self._arc_hz + self._grid_hz
-        peak = power[:, 1:-1].argmax(axis=1)
-        return np.asarray(offset_hz[np.arange(batch), peak], dtype=np.float64)
-
-    def fold(self, rows: RealArray, offset_hz: FloatArray) -> ComplexArray:
-        """Sum of the periods [batch, 1, period] after turning back by `offset_hz` [batch].
-
-        The phase is turned about the middle of the burst.
-
-        Parameters
-        ----------
-        rows : float [batch, rows, 2 period]
-            The periods of each burst, or their sums weighted by `tapers`, as real and
-            imaginary parts.
-        offset_hz : float [batch]
-            Offset to remove [Hz].
-        """
-        tapers, _, _, ramp = self._tables[rows.dtype]
-        batch = len(rows)
-        turn = cis(offset_hz.astype(ramp.dtype)[:, None] * ramp)
-        i, j, k = self._split
-        over: Any = turn[:, :i, None] * turn[:, None, i:j]
-        over = over.reshape(batch, 1, self._periods)
-        if tapers is not None:
-            over = over @ tapers
-        within = turn[:, j:k, None] * turn[:, None, k:]
-        folded = over @ rows.view(turn.dtype)
-        folded *= within.reshape(batch, 1, self._period)
-        return np.asarray(folded, dtype=np.complex128)
-
-
-class _Tables(NamedTuple):
-    """Matrices in the precision of the bursts."""
-
-    tapers: NDArray[Any] | None
-    basis: NDArray[Any]
-    grid: NDArray[Any]
-    ramp: NDArray[Any]
-
-    @classmethod
-    def of(
-        cls,
-        signal: RangingSignal,
-        components: FmSpectrum,
-        grid_hz: FloatArray,
-        repeats: int,
-        tapers: FloatArray | None,
-    ) -> _Tables:
-        period = signal.period_samples
-        periods = signal.samples // period
-        # The time of a sample about the middle is a sum of four terms, so its phasor is
-        # a product of entries of four short tables.
-        i, j = _factors(periods)
-        k, m = _factors(period)
-        steps = ((i, j * period), (j, period), (k, m), (m, 1))
-        times = [(np.arange(count) - (count - 1) / 2) * step for count, step in steps]
-        per_hz = -2 * math.pi / signal.sample_rate_hz
+            repeats = _segment_periods(periods, max_offset_hz * period / rate_hz)
         segments = periods // repeats
         centres = (np.arange(segments) - (segments - 1) / 2) * (repeats * period)
-        turn = cis(per_hz * np.outer(grid_hz, centres))
-        if tapers is not None:
-            turn = turn @ tapers.T
+        turn = cis(-2 * math.pi / rate_hz * np.outer(grid_hz, centres))
+        if self.tapers is not None:
+            turn = turn @ self.tapers.T
+        self.grid = np.stack([turn.real, turn.imag])
+        """Turns of segments, or of weighted sums, at the offsets from zero up: [2, grid, rows]."""
+        self.halves = _halves(self.tapers, periods)
+        """Twice the weights from the middle of the burst up [tapers, half]; [0, 0] if none."""
+        self.numbers = np.array(
+            [
+                step_hz,
+                math.tan(math.pi / (2 * segments)),
+                segments / math.pi / signal.duration_s,
+                math.pi / rate_hz,
+                math.pi / rate_hz * period,
+                periods,
+            ]
+        )
+        """Step of the grid [Hz], K-fold tangent and hertz of the interpolation, turns of half a
+        sample and of half a period [rad/Hz], periods."""
         # Real before imaginary parts, so that products with the grid stay real.
         basis = components.real_basis(period).reshape(2 * period, -1, 2).swapaxes(1, 2)
-        re, im = turn.real, turn.imag
-        grid = np.stack([np.stack([re, -im], axis=-1), np.stack([im, re], axis=-1)], axis=1)
-        return cls(
-            None if tapers is None else tapers.T.astype(np.complex128),
-            np.tile(basis.reshape(2 * period, -1), (repeats, 1)),
-            grid.reshape(2 * len(grid_hz), -1),
-            per_hz * np.concatenate(times),
-        )
-
-    def astype(self, kind: DTypeLike) -> _Tables:
-        tapers, *rest = self
-        paired = None if tapers is None else tapers.astype(np.result_type(kind, np.complex64))
-        return _Tables(paired, *(np.ascontiguousarray(table, dtype=kind) for table in rest))
+        one = basis.reshape(2 * period, -1)
+        self.strong = np.ascontiguousarray(one.T)
+        """From a period to the components, real and then imaginary parts: [2 L, 2 period]."""
+        self.segment_basis = np.tile(one, (repeats, 1))
+        """From the periods of a segment to its components: [2 period repeats, 2 L]."""
 
 
-def _factors(count: int) -> tuple[int, int]:
-    """Two factors of `count`, as close to each other as they come."""
-    low = max(d for d in range(1, math.isqrt(count) + 1) if count % d == 0)
-    return count // low, low
+def _halves(tapers: FloatArray | None, periods: int) -> FloatArray:
+    """Weights [tapers, half] from the middle up, twice, but for that of a period in it."""
+    if tapers is None:
+        return np.zeros((0, 0))
+    halves = 2.0 * tapers[:, periods // 2 :]
+    if periods % 2:
+        halves[:, 0] /= 2
+    return halves
 
 
 def _segment_periods(periods: int, cycles_per_period: float) -> int:
@@ -224,7 +151,12 @@ def slepian_sequences(count: int, cycles: float, loss: float) -> FloatArray:
     (8, 124)
     """
     index = np.arange(count)
-    _, vectors = np.linalg.eigh(np.sinc(2 * cycles * (index[:, None] - index)))
+    # Of a matrix with their eigenvectors whose eigenvalues lie apart (Slepian, equation 14), so
+    # that sequences are even or odd to the last digits.
+    matrix = np.diag((index - (count - 1) / 2) ** 2 * math.cos(2 * math.pi * cycles))
+    beside = index[1:] * (count - index[1:]) / 2
+    matrix += np.diag(beside, 1) + np.diag(beside, -1)
+    _, vectors = np.linalg.eigh(matrix)
     sequences = vectors.T[::-1]
     tones = cis(2 * math.pi * np.outer(np.linspace(0, cycles, 2 * count), index))
     held = np.cumsum(np.abs(tones @ sequences.T) ** 2, axis=1).min(axis=0) / count

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.arrays import BoolArray, FloatArray
 
+from .burst_kernel import estimate_bursts
 from .detector import detection_threshold
 from .fm_spectrum import fm_spectrum
 from .offset_search import OffsetSearch, RealArray
@@ -31,6 +32,7 @@ MAX_SNR_SINGLE = 1e6
 
 _STRONG_FRACTION = 0.92
 _CHUNK_BYTES = 3 << 18
+_FEW_SEGMENTS = 8
 
 
 @dataclass(frozen=True)
@@ -120,14 +122,37 @@ class FmToneReceiver:
             )
         components = fm_spectrum(signal)
         strong = components.strongest(_STRONG_FRACTION)
-        self._search = OffsetSearch(signal, strong, max_offset_hz) if max_offset_hz > 0 else None
-        self._weights = self._search.tapers if self._search else np.ones((1, self._periods))
-        search_hz = self._search.width_hz if self._search else 0.0
+        search = OffsetSearch(signal, strong, max_offset_hz) if max_offset_hz > 0 else None
+        search_hz = search.width_hz if search else 0.0
         samples = signal.samples
         fraction = detection_threshold(
             false_alarm, len(strong.bins), samples, search_hz, signal.duration_s
         )
-        self._fit = TonePhaseFit(signal, components, strong, fraction)
+        fit = TonePhaseFit(signal, components, strong, fraction)
+        self._tables = (
+            search.strong if search else np.zeros((1, 1)),
+            search.grid if search else np.zeros((2, 1, 1)),
+            search.halves if search else np.zeros((0, 0)),
+            search.numbers if search else np.zeros(6),
+            fit.basis,
+            fit.orders,
+            fit.weights,
+            fit.pairs,
+            fit.pair_weights,
+        )
+        weights = search.tapers if search else np.ones((1, self._periods))
+        segments = search.grid.shape[2] if search else 1
+        has_products = weights is not None or segments > _FEW_SEGMENTS
+        self._plans = {
+            np.dtype(kind): _Plan(
+                has_products,
+                None if weights is None else weights.astype(kind),
+                np.ascontiguousarray(search.segment_basis, dtype=kind) if search else None,
+                fit.levels(ceiling),
+                (np.zeros(0, dtype=kind), np.zeros((0, 0, 0), dtype=kind)),
+            )
+            for kind, ceiling in _CEILINGS.items()
+        }
 
     def estimate(self, bursts: ArrayLike) -> ToneEstimate:
         """Estimate tone phases, offset, amplitude and noise of each burst.
@@ -152,20 +177,19 @@ class FmToneReceiver:
         if x.ndim == 0 or x.shape[-1] != samples:
             raise ValueError(f"bursts must have {samples} samples, got shape {x.shape}")
         lead = x.shape[:-1]
-        real, max_snr = _SINGLE if x.dtype == np.complex64 else _DOUBLE
+        real = np.float32 if x.dtype == np.complex64 else np.float64
         parts = np.ascontiguousarray(x).reshape(-1, samples).view(real)
-        with np.errstate(all="ignore"):
-            # In pieces that stay in the processor's cache.
-            step = max(1, _CHUNK_BYTES // (samples * x.itemsize))
-            if len(parts) <= step or self._weights is not None:
-                energy, offset_hz, folded = self._fold_bursts(parts, step)
-            else:
-                pieces = [
-                    self._fold_bursts(parts[i : i + step], step) for i in range(0, len(parts), step)
-                ]
-                energy, offset_hz, folded = map(np.concatenate, zip(*pieces, strict=True))
-            table, detected = self._fit.evaluate(energy, offset_hz, folded, max_snr)
         tones = len(self.signal.tones_hz)
+        table = np.empty((len(parts), 2 * tones + 4))
+        detected = np.empty(len(parts), dtype=np.bool_)
+        # In pieces that stay in the processor's cache.
+        step = max(1, _CHUNK_BYTES // (samples * x.itemsize))
+        if len(parts) <= step:
+            self._estimate_piece(parts, table, detected)
+        else:
+            for i in range(0, len(parts), step):
+                piece = slice(i, i + step)
+                self._estimate_piece(parts[piece], table[piece], detected[piece])
         table = table.reshape(*lead, 2 * tones + 4)
         return ToneEstimate(
             table[..., :tones],
@@ -177,34 +201,38 @@ class FmToneReceiver:
             detected.reshape(lead),
         )
 
-    def _fold_bursts(
-        self, parts: RealArray, step: int
-    ) -> tuple[RealArray, FloatArray, ComplexArray]:
-        """Energy, offset [batch] and folded period [batch, 1, period] of bursts."""
-        energy, rows = self._sum_bursts(parts, step)
-        if self._search:
-            offset_hz = self._search.offset_hz(rows)
-            return energy, offset_hz, self._search.fold(rows, offset_hz)
-        return energy, np.zeros(len(parts)), rows.astype(np.float64).view(np.complex128)
-
-    def _sum_bursts(self, parts: RealArray, step: int) -> tuple[RealArray, RealArray]:
-        """Energy [batch] and the rows of `OffsetSearch.fold` of bursts [batch, 2 samples].
-
-        Weighted sums are made of `step` bursts at a time.
-        """
-        batch = len(parts)
-        rows = parts.reshape(batch, self._periods, 2 * self._period)
-        if self._weights is None:
-            return np.vecdot(parts, parts), rows
-        weights = self._weights.astype(parts.dtype)
-        energy = np.empty(batch, dtype=parts.dtype)
-        sums = np.empty((batch, len(weights), rows.shape[2]), dtype=parts.dtype)
-        for i in range(0, batch, step):
-            piece = slice(i, i + step)
-            np.vecdot(parts[piece], parts[piece], out=energy[piece])
-            np.matmul(weights, rows[piece], out=sums[piece])
-        return energy, sums
+    def _estimate_piece(self, parts: RealArray, table: FloatArray, detected: BoolArray) -> None:
+        """Fill the fields of some bursts [batch, 2 samples] (`estimate_bursts`)."""
+        plan = self._plans[parts.dtype]
+        rows = parts.reshape(len(parts), self._periods, 2 * self._period)
+        energy, components = plan.nothing
+        if plan.has_products:
+            # Stacked, one of fixed shape for each burst, so that rounding does not depend on
+            # the batch. Too large or not finite is not detected.
+            with np.errstate(all="ignore"):
+                # The sums come first: what reads the bursts from far away hides it best.
+                if plan.weights is not None:
+                    rows = np.matmul(plan.weights, rows)
+                energy = np.vecdot(parts, parts)
+                if plan.basis is not None:
+                    segments = rows.reshape(len(parts), -1, len(plan.basis))
+                    components = np.matmul(segments, plan.basis)
+        estimate_bursts(energy, rows, components, *self._tables, plan.levels, table, detected)
 
 
-_SINGLE = (np.dtype(np.float32), MAX_SNR_SINGLE)
-_DOUBLE = (np.dtype(np.float64), MAX_SNR)
+@dataclass(frozen=True)
+class _Plan:
+    """What is done in the precision of the bursts before the compiled part.
+
+    With `has_products` energy, sums by `weights` and components by `basis` are matrix products;
+    without, the compiled part forms them: for few segments that takes less than the calls.
+    """
+
+    has_products: bool
+    weights: RealArray | None
+    basis: RealArray | None
+    levels: FloatArray
+    nothing: tuple[RealArray, RealArray]
+
+
+_CEILINGS = {np.float32: MAX_SNR_SINGLE, np.float64: MAX_SNR}

@@ -19,6 +19,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
+from rail_signals.compiled import compiled
 
 from .block_demodulator import BlockDemodulator
 from .decision import MOST_NOISE, Decision, no_slot, read_only
@@ -36,7 +37,9 @@ SingleArray: TypeAlias = NDArray[np.float32]
 RealArray: TypeAlias = NDArray[np.floating]
 
 _BATCH_HOPS = 2048
-_PIECE_BYTES = 1 << 17
+_PIECE_BYTES = 1 << 18
+# Bits of a float but its sign, by its size in bytes: magnitudes are in the order of these numbers.
+_MAGNITUDES = {4: np.int32(0x7FFFFFFF), 8: np.int64(0x7FFFFFFFFFFFFFFF)}
 
 
 @dataclass(frozen=True)
@@ -218,7 +221,8 @@ class TrackCodeReceiver(ReferenceTrackCodeReceiver):
         profile, tones = self.profile, self.profile.tones
         measured = slots @ self._measure
         amplitudes, left = measured[:, : 2 * tones], measured[:, 2 * tones :]
-        levels = np.hypot(amplitudes[:, :tones], amplitudes[:, tones:]) / self._deviations
+        real, imag = amplitudes[:, :tones], amplitudes[:, tones:]
+        levels = np.sqrt(real * real + imag * imag) / self._deviations
         noise = np.sqrt(np.vecdot(left, left) / left.shape[1]) * self._worst_spread
         bits = levels > (profile.absent_max + profile.present_min) / 2
         present = (levels >= profile.present_min) & (levels <= profile.present_max)
@@ -259,11 +263,45 @@ def _rms(rows: SingleArray) -> SingleArray:
 
 def _input_faults(frames: RealArray) -> BoolArray:
     """Which hops [hops, frame] hold samples at fault; what fault is said hop by hop."""
-    size = np.abs(frames)
-    peak = size.max(axis=1)
-    faulty = ~((peak > 0) & (peak <= LOUDEST))
-    # Few as high as the lowest peak, and there are few at each peak: the count that is cheap.
-    most = MOST_AT_PEAK * frames.shape[1]
-    if np.count_nonzero(size >= peak[~faulty].min(initial=np.inf)) > most:
-        faulty |= np.count_nonzero(size == peak[:, None], axis=1) > most
-    return np.asarray(faulty, dtype=np.bool_)
+    whole = frames if frames.itemsize in _MAGNITUDES else frames.astype(np.float64)
+    mask = _MAGNITUDES[whole.itemsize]
+    peak_bits, at_peak = np.empty(len(frames), mask.dtype), np.empty(len(frames), np.intp)
+    _peaks(np.ascontiguousarray(whole).view(mask.dtype), mask, peak_bits, at_peak)
+    peak = peak_bits.view(whole.dtype)
+    sound = (peak > 0) & (peak <= LOUDEST) & (at_peak <= MOST_AT_PEAK * frames.shape[1])
+    return np.asarray(~sound, dtype=np.bool_)
+
+
+@compiled
+def _peaks(
+    bits: NDArray[np.signedinteger],
+    mask: np.signedinteger,
+    peak: NDArray[np.signedinteger],
+    at_peak: NDArray[np.intp],
+) -> None:
+    """Largest magnitude of every hop, and how many samples have it.
+
+    Integers are compared, which several lanes at once can do in any order; NaN is the largest.
+
+    Parameters
+    ----------
+    bits : int32 or int64 [hops, frame]
+        Floats as they are stored.
+    mask
+        All bits but the sign.
+    peak : int32 or int64 [hops]
+        Bits of the largest magnitude; result.
+    at_peak : intp [hops]
+        Result.
+    """
+    for hop in range(len(bits)):
+        row = bits[hop]
+        most = mask ^ mask
+        for i in range(len(row)):
+            most = max(most, row[i] & mask)
+        peak[hop] = most
+        most = peak[hop]  # as narrow as the samples
+        count = 0
+        for i in range(len(row)):
+            count += (row[i] & mask) == most
+        at_peak[hop] = count

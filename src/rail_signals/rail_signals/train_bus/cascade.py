@@ -14,6 +14,9 @@ grows on long lossy lines, and open and shorted ends are no special cases.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,10 +25,7 @@ from rail_signals.arrays import ComplexArray, FloatArray
 
 from .bus_line import BusLine, CableSection, Coupler, Element, SeriesElement, ShuntElement, Stub
 from .cable import Cable, WaveConstants
-
-# A section doubles the numbers that describe it; every so often they are made small again.
-_RESCALE = 256
-_SCALE = 2.0**-_RESCALE
+from .section_kernel import through_sections
 
 
 def input_reflection(
@@ -143,20 +143,13 @@ class CascadePass:
     def head(self, bus_line: BusLine) -> tuple[ComplexArray, ComplexArray]:
         """Voltage and current at the head, but for a factor they share."""
         voltage, current = bus_line.termination.voltage_and_current(self.s)
-        behind: CableSection | None = None  # if there is one, `current` is Z0 I of this section
-        for count, element in enumerate(reversed(bus_line.elements), 1):
-            if isinstance(element, CableSection):
-                self._enter(element, behind, current)
-                self._through(voltage, current, self._decay_of(element, 2.0, self._decay))
-                behind = element
+        elements = reversed(bus_line.elements)
+        for cable, run in groupby(elements, _cable_of):
+            if cable is None:
+                for element in run:
+                    self._past(element, voltage, current)
             else:
-                self._leave(behind, current)
-                self._past(element, voltage, current)
-                behind = None
-            if count % _RESCALE == 0:
-                voltage *= _SCALE
-                current *= _SCALE
-        self._leave(behind, current)
+                self._through_run(cable, list(run), voltage, current)
         return voltage, current
 
     def ports(
@@ -179,7 +172,7 @@ class CascadePass:
             voltage, current = voltage.copy(), current.copy()
             if isinstance(element, CableSection):
                 decay = self._decay_of(element, 1.0, np.empty_like(self.s))
-                self._enter(element, None, current)
+                self._enter(element, current)
                 self._through(voltage, current, np.square(decay, out=self._decay))
                 self._leave(element, current)
                 decay *= 2
@@ -210,25 +203,42 @@ class CascadePass:
         decay = decays[0]
         return np.asarray(voltages[1] / voltages[0] * (1.0 if decay is None else decay))
 
-    def _enter(
-        self, section: CableSection, behind: CableSection | None, current: ComplexArray
+    def _through_run(
+        self,
+        cable: Cable,
+        sections: Sequence[Any],
+        voltage: ComplexArray,
+        current: ComplexArray,
     ) -> None:
-        """Make the current ``Z0 I`` of a section, in place."""
-        factor = section.impedance_factor
-        if behind is not None and behind.cable == section.cable:
-            factor /= behind.impedance_factor
-        else:
-            self._leave(behind, current)
-            current *= self.wave(section.cable).impedance
-        if factor != 1:
-            current.view(np.float64)[...] *= factor
+        """Carry voltage and current over sections of one cable, the last first, in place."""
+        wave = self.wave(cable)
+        factors = [section.impedance_factor for section in sections]
+        lengths = np.array([section.length_m * section.delay_factor for section in sections])
+        ratios = np.array(factors) / np.array([1.0, *factors[:-1]])
+        current *= wave.impedance
+        through_sections(
+            voltage.view(np.float64),
+            current.view(np.float64),
+            wave.attenuation,
+            wave.phase,
+            lengths,
+            ratios,
+        )
+        current *= wave.admittance
+        if factors[-1] != 1:
+            current.view(np.float64)[...] /= factors[-1]
 
-    def _leave(self, behind: CableSection | None, current: ComplexArray) -> None:
+    def _enter(self, section: CableSection, current: ComplexArray) -> None:
+        """Make the current ``Z0 I`` of a section, in place."""
+        current *= self.wave(section.cable).impedance
+        if section.impedance_factor != 1:
+            current.view(np.float64)[...] *= section.impedance_factor
+
+    def _leave(self, section: CableSection, current: ComplexArray) -> None:
         """Make it the current again, in place."""
-        if behind is not None:
-            current *= self.wave(behind.cable).admittance
-            if behind.impedance_factor != 1:
-                current.view(np.float64)[...] /= behind.impedance_factor
+        current *= self.wave(section.cable).admittance
+        if section.impedance_factor != 1:
+            current.view(np.float64)[...] /= section.impedance_factor
 
     def _through(self, voltage: ComplexArray, drop: ComplexArray, decay: ComplexArray) -> None:
         """Carry voltage and ``Z0 I`` over a section, in place; both come out twice as large."""
@@ -284,6 +294,10 @@ def wave_exponential(
     fraction *= tangent
     np.negative(fraction, out=out.imag)
     return out
+
+
+def _cable_of(element: Element) -> Cable | None:
+    return element.cable if isinstance(element, CableSection) else None
 
 
 def _stub_line(stub: Stub) -> BusLine:

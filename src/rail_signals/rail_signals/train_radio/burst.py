@@ -24,7 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
 from rail_signals.compiled import compiled
 
-from .pilot_estimation import PilotPattern, wiener_estimator
+from .pilot_estimation import wiener_estimator
+from .pilot_pattern import PilotPattern
 from .pulse import matched_filter, root_raised_cosine, shape_pulses
 from .space_time_block import Scheme
 from .symbol_mapping import BitArray, Constellation
@@ -180,8 +181,10 @@ class RadioBurstFormat:
         if values.ndim == 0 or values.shape[-1] != self.data_bits:
             raise ValueError(f"bits must be [..., {self.data_bits}], got shape {values.shape}")
         room = self.pattern.data_symbols * self.constellation.bits_per_symbol
-        fill = np.zeros((*values.shape[:-1], room - self.data_bits), dtype=values.dtype)
-        symbols = self.constellation.modulate(np.concatenate([values, fill], axis=-1))
+        if room > self.data_bits:
+            fill = np.zeros((*values.shape[:-1], room - self.data_bits), dtype=values.dtype)
+            values = np.concatenate([values, fill], axis=-1)
+        symbols = self.constellation.modulate(values)
         burst = self.pattern.insert(self.scheme.encode(symbols))
         wave = np.empty((*burst.shape[:-1], self.samples), dtype=np.complex128)
         shape_pulses(_parts(burst), self.pulse, self._rows(wave))

@@ -65,8 +65,11 @@ class RadioSlots:
 
     def bursts(self, frames: Sequence[bytes]) -> ComplexArray:
         """Waves of unit energy per symbol that carry frames, complex128 [frame, tx, sample]."""
-        bits = np.zeros((0, self.burst.data_bits), dtype=np.uint8)
-        return self.burst.transmit(bits_of(frames) if frames else bits)
+        if not frames:
+            return np.zeros(
+                (0, self.burst.scheme.transmit, self.burst.samples), dtype=np.complex128
+            )
+        return self.burst.transmit(bits_of(frames))
 
     def block(self, frames: Mapping[int, bytes]) -> ComplexArray:
         """Block with a frame in each slot named, zero elsewhere; complex128 [tx, samples]."""

@@ -65,11 +65,6 @@ class Scheme:
             raise ValueError(f"receive must be 1 antenna or more, got {self.receive!r}")
 
     @property
-    def antenna_power(self) -> float:
-        """Fraction of the transmit power that each antenna sends."""
-        return 1.0 / self.transmit
-
-    @property
     def diversity(self) -> int:
         """Independent branches that carry each symbol."""
         return self.transmit * self.receive
@@ -91,12 +86,9 @@ class Scheme:
         if self.transmit == 1:
             return np.array(x[..., None, :])
         sent = np.empty((*x.shape[:-1], 2, x.shape[-1]), dtype=np.complex128)
-        first, second = x[..., 0::2], x[..., 1::2]
-        sent[..., 0, 0::2] = first
-        sent[..., 0, 1::2] = -second.conj()
-        sent[..., 1, 0::2] = second
-        sent[..., 1, 1::2] = first.conj()
-        sent *= math.sqrt(self.antenna_power)
+        _encoded(
+            np.ascontiguousarray(x).reshape(-1, x.shape[-1]), sent.reshape(-1, *sent.shape[-2:])
+        )
         return sent
 
     def combine(self, received: ArrayLike, channel: ArrayLike) -> tuple[ComplexArray, FloatArray]:
@@ -157,6 +149,18 @@ class Scheme:
 
 
 @compiled
+def _encoded(x: ComplexArray, sent: ComplexArray) -> None:
+    """Code of eq. 1: symbols complex128 [burst, n] to the antennas' [burst, 2, n], the result."""
+    amplitude = math.sqrt(0.5)
+    for burst in range(len(x)):
+        first, second = sent[burst]
+        for i in range(0, x.shape[1], 2):
+            a, b = x[burst, i] * amplitude, x[burst, i + 1] * amplitude
+            first[i], first[i + 1] = a, -b.conjugate()
+            second[i], second[i + 1] = b, a.conjugate()
+
+
+@compiled
 def _combined(y: ComplexArray, h: ComplexArray, symbols: ComplexArray, gain: FloatArray) -> None:
     """Sums of eq. 8 over the weights they carry.
 
@@ -180,25 +184,23 @@ def _combined(y: ComplexArray, h: ComplexArray, symbols: ComplexArray, gain: Flo
             if transmit == 1:
                 for i in range(count):
                     x[i] += h1[i].conjugate() * z[i]
-                    g[i] += h1[i].real ** 2 + h1[i].imag ** 2
+                    g[i] += _power(h1[i])
             else:
                 for i in range(0, count, 2):
                     early, late = z[i], z[i + 1].conjugate()
                     x[i] += h1[i].conjugate() * early + h2[i + 1] * late
                     x[i + 1] += h2[i].conjugate() * early - h1[i + 1] * late
-                    g[i] += (h1[i].real ** 2 + h1[i].imag ** 2) + (
-                        h2[i + 1].real ** 2 + h2[i + 1].imag ** 2
-                    )
-                    g[i + 1] += (h2[i].real ** 2 + h2[i].imag ** 2) + (
-                        h1[i + 1].real ** 2 + h1[i + 1].imag ** 2
-                    )
+                    g[i] += _power(h1[i]) + _power(h2[i + 1])
+                    g[i + 1] += _power(h2[i]) + _power(h1[i + 1])
         for i in range(count):
             g[i] *= power
-            x[i] = (
-                complex(x[i].real * amplitude / g[i], x[i].imag * amplitude / g[i])
-                if g[i] > 0.0
-                else 0j
-            )
+            scale = amplitude / g[i] if g[i] > 0.0 else 0.0
+            x[i] = complex(x[i].real * scale, x[i].imag * scale)
+
+
+@compiled
+def _power(gain: complex) -> float:
+    return gain.real**2 + gain.imag**2
 
 
 _SCHEMES: Final = {

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from rail_corridor.errors import InputError
 from rail_world.line.network import Network
@@ -69,6 +68,8 @@ def find_fouling_point(network: Network, junction: int, distance_m: float) -> Fo
         point = np.array([at_m])
         beside = _project(track, branch, point, description.at_m)
         return float(_gap_m(track, branch, point, beside)[0]) - distance_m
+
+    from scipy.optimize import brentq  # a quarter of a second, and not for every start
 
     at_m = float(brentq(excess_m, branch_m[first - 1], branch_m[first], xtol=1e-9))
     beside_m = float(_project(track, branch, np.array([at_m]), description.at_m)[0])

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from rail_corridor.run.launcher import RunOptions, run
+from rail_corridor.run.launcher import run
+from rail_corridor.run.options import RunOptions
 from rail_corridor.scenario.model import Scenario
 
 from .cost_table import TickCosts, costs_of, print_costs

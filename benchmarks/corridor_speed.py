@@ -66,10 +66,10 @@ def _row(name: str, scenario: Scenario) -> dict[str, Any]:
     return {
         "name": name,
         "unit": "x real time",
-        "ours": tick_ms / found["tick_ms"],
+        "ours": tick_ms / found["wall_tick_ms"],
         "peer_name": "real time",
         "peer": 1.0,
-        "ratio": tick_ms / found["tick_ms"],
+        "ratio": tick_ms / found["wall_tick_ms"],
         "bound": tick_ms / (transport_ms + arithmetic_ms),
         "ms_per_tick": found["tick_ms"],
         "transport_ms_per_tick": transport_ms,

@@ -14,6 +14,7 @@ MODULES = {
     "wrs.py": "rail_wayside.ranging.wrs_node",
     "receiver.py": "rail_signals.ranging.receiver",
     "intake.py": "rail_corridor.report.intake",
+    "inputs.py": "rail_msgs_py.tick_inputs",
     "dispatcher.py": "numba.core.dispatcher",
 }
 KINDS = {"rail_wayside.ranging.wrs_node": "ranging: wrs", "rail_corridor.report": "report"}
@@ -33,6 +34,9 @@ KINDS = {"rail_wayside.ranging.wrs_node": "ranging: wrs", "rail_corridor.report"
         ("rail_world.ranging.medium", "arithmetic"),
         ("rail_world.train_radio.fading_kernel", "arithmetic"),
         ("rail_world.trains.motion", "arithmetic"),
+        ("rail_world.noise_kernels", "arithmetic"),
+        ("rail_world.medium_node", "interpreter"),
+        ("rail_corridor.run.launcher", "transport"),
         ("rail_world.ranging.medium_node", "interpreter"),
         ("rail_world.world_node", "interpreter"),
         ("rail_wayside.ranging.train_tracker", "interpreter"),
@@ -57,10 +61,20 @@ def test_stage_of_a_module(module: str, stage: Stage | None) -> None:
         ("launcher.py delivery.py", ("transport", "transport", -1)),
         ("launcher.py delivery.py intake.py", ("report", "interpreter", 2)),
         ("<string>", ("transport", "interpreter", -1)),
+        ("launcher.py <string>", ("transport", "transport", -1)),
     ],
 )
 def test_whose_a_stack_is(files: str, whose: tuple[str, Stage, int]) -> None:
     assert Attributor(KINDS, MODULES).attribute(files.split()) == whose
+
+
+def test_what_is_done_for_a_node_before_its_callback_is_that_node_s() -> None:
+    attributor = Attributor(KINDS, MODULES)
+    before = ["launcher.py", "delivery.py", "inputs.py"]
+    reader = "rail_wayside.ranging.wrs_node"
+    assert attributor.attribute(before, reader) == ("ranging: wrs", "transport", 1)
+    assert attributor.attribute(["delivery.py", "intake.py"], reader).kind == "report"
+    assert attributor.attribute(before, "rail_corridor.studies.x").kind == "transport"
 
 
 def test_every_kind_of_node_has_a_row_of_its_own() -> None:

@@ -20,7 +20,17 @@ NODES = {"world": 1, "wrs": 16, "idle": 2}
 
 
 def costs() -> TickCosts:
-    return TickCosts(costs_of(SAMPLES, NODES, 4.0), 0.25, 4.0, 0.02, 800, 0.5, 1.5)
+    return TickCosts(
+        costs_of(SAMPLES, NODES, 4.0),
+        tick_s=0.25,
+        tick_ms=4.0,
+        wall_tick_ms=5.0,
+        sampling=0.02,
+        samples=800,
+        hand_over_ms=0.1,
+        middleware_ms=0.4,
+        arithmetic_ms=1.5,
+    )
 
 
 def test_rows_add_up_to_a_tick_and_the_dearest_is_first() -> None:
@@ -38,6 +48,7 @@ def test_without_samples_nothing_is_divided() -> None:
 def test_values_hold_the_rows_the_floors_and_their_ratio() -> None:
     values = costs().values()
     assert values["ratio"] == 2.0
+    assert values["transport_floor_ms"] == 0.5
     assert values["kinds"][0] == {
         "kind": "wrs",
         "nodes": 16,
@@ -48,30 +59,18 @@ def test_values_hold_the_rows_the_floors_and_their_ratio() -> None:
 
 
 def test_the_table_shows_the_whole_tick_and_the_floors() -> None:
-    console = Console(file=io.StringIO(), width=120)
+    console = Console(file=io.StringIO(), width=80)
     print_costs(costs(), "demo", console)
-    text = console.file.getvalue()  # type: ignore[attr-defined]
-    rows = {
-        line.split("│")[1].strip(): line.split("│")[2:-1]
-        for line in text.splitlines()[4:10:1]
-        if "│" in line
-    }
-    assert [cell.strip() for cell in rows["wrs"]] == [
-        "16",
-        "0.500",
-        "1.500",
-        "0.000",
-        "2.000",
-        "50.0%",
-    ]
-    whole = next(line for line in text.splitlines() if "whole tick" in line)
-    assert [cell.strip() for cell in whole.split("│")[2:-1]] == [
-        "19",
-        "2.000",
-        "1.500",
-        "0.500",
-        "4.000",
-        "100.0%",
-    ]
-    assert "transport 0.500 ms, arithmetic 1.500 ms; a tick takes 2.00 times both" in text
-    assert "62.5 times real time; 800 samples, which made a tick +2.0% longer" in text
+    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert max(map(len, lines[:9])) <= 80
+    (wrs,) = [line.split() for line in lines if line.startswith(" wrs")]
+    assert wrs == ["wrs", "16", "0.500", "1.500", "0.000", "2.000", "50.0%"]
+    (whole,) = [line.split() for line in lines if line.startswith(" whole tick")]
+    assert whole == ["whole", "tick", "19", "2.000", "1.500", "0.500", "4.000", "100.0%"]
+    floors, clock, samples = lines[-3:]
+    assert floors == (
+        "floors: transport 0.500 ms (0.100 in the process, 0.400 by the middleware), "
+        "arithmetic 1.500 ms; a tick takes 2.00 times both"
+    )
+    assert clock.endswith("5.000 ms of wall time, 50.0 times real time")
+    assert samples.startswith("800 samples, which made a tick +2.0% longer")

@@ -8,11 +8,14 @@ from typing import Final, Literal, NamedTuple
 
 Stage = Literal["transport", "arithmetic", "interpreter"]
 STAGES: Final[tuple[Stage, ...]] = ("transport", "arithmetic", "interpreter")
-#: Kind of what is under way outside the callbacks of all nodes.
+#: Kind of what is under way for no node in particular.
 TRANSPORT: Final = "transport"
 
 _ARITHMETIC: Final = {"rail_signals", "numpy", "scipy"}
 _TRANSPORT: Final = {"rail_msgs_py", "rclpy", "rpyutils"}
+_DELIVERY: Final = "rail_msgs_py.delivery"
+#: Spins the executor, whose own code is compiled.
+_LAUNCHER: Final = "rail_corridor.run.launcher"
 #: What works for whoever calls it, as compiled kernels' dispatchers do.
 _OF_THE_CALLER: Final = {"", "numba", "llvmlite"} | sys.stdlib_module_names
 
@@ -29,12 +32,12 @@ def stage_of(module: str) -> Stage | None:
     >>> stage_of("rail_world.ranging.medium_node"), stage_of("functools")
     ('interpreter', None)
     """
-    package, *inner = module.split(".")
+    package = module.partition(".")[0]
     if package in _OF_THE_CALLER:
         return None
-    if package in _TRANSPORT or package.endswith(("_msgs", "_interfaces")):
+    if package in _TRANSPORT or module == _LAUNCHER or package.endswith(("_msgs", "_interfaces")):
         return "transport"
-    computes = package == "rail_world" and len(inner) > 1 and not inner[-1].endswith("_node")
+    computes = package == "rail_world" and not module.endswith("_node")
     return "arithmetic" if computes or package in _ARITHMETIC else "interpreter"
 
 
@@ -66,8 +69,17 @@ class Attributor:
     def __init__(self, kinds: Mapping[str, str], modules: Mapping[str, str]) -> None:
         self._kinds, self._modules = kinds, modules
 
-    def attribute(self, files: Sequence[str]) -> Attribution:
-        """Whose a stack is, by the files of its functions, the root first."""
+    def attribute(self, files: Sequence[str], reader: str = "") -> Attribution:
+        """Whose a stack is.
+
+        Parameters
+        ----------
+        files : sequence of str
+            Of its functions, the root first.
+        reader : str
+            Module of the node that is being handed a message: what is done for it before and after
+            its callback.
+        """
         modules = [self._modules.get(file, "") for file in files]
         stages = (stage_of(module) for module in reversed(modules))
         stage: Stage = next((stage for stage in stages if stage is not None), "interpreter")
@@ -75,6 +87,9 @@ class Attributor:
             kind = kind_of(module, self._kinds)
             if kind is not None:
                 return Attribution(kind, stage, begin)
+        kind = kind_of(reader, self._kinds)
+        if kind is not None and _DELIVERY in modules:
+            return Attribution(kind, stage, modules.index(_DELIVERY))
         return Attribution(TRANSPORT, stage, -1)
 
 

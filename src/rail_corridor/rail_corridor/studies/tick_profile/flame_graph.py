@@ -34,7 +34,7 @@ def write_flame_graph(
 
     Parameters
     ----------
-    stacks : sequence of stack and wall time [s]
+    stacks : sequence of stack and time [s]
     attribute : callable
         Whose a stack is.
     title : str
@@ -43,7 +43,7 @@ def write_flame_graph(
     records: list[tuple[list[str], float]] = []
     for stack, seconds in stacks:
         whose = attribute(stack)
-        of_callback = stack[whose.begin :] if whose.begin >= 0 else stack[-1:]
+        of_callback = stack.functions[whose.begin :] if whose.begin >= 0 else stack.functions[-1:]
         frames = [
             _frame(
                 getattr(code, "co_qualname", code.co_name), code.co_filename, code.co_firstlineno

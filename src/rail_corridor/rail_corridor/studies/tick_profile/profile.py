@@ -42,7 +42,7 @@ def profile(scenario: Scenario, flame: Path | None, rows: Path | None, console: 
     title = f"{scenario.name}, seed {scenario.seed}: where a tick goes"
     print_costs(costs, title, console)
     if flame is not None:
-        write_flame_graph(probe.sampler.wall_s(), probe.attribute, title, flame)
+        write_flame_graph(probe.sampler.cpu_s(), probe.attribute, title, flame)
         console.print(f"flame graph written to {flame}", highlight=False, soft_wrap=True)
     if rows is not None:
         rows.write_text(json.dumps({"scenario": scenario.name, **costs.values()}, indent=2) + "\n")
@@ -54,15 +54,17 @@ def tick_costs(scenario: Scenario, probe: TickProbe) -> TickCosts:
     plain_s, sampled_s = probe.tick_s("plain"), probe.tick_s("sampled")
     samples = (
         (whose.kind, whose.stage, seconds)
-        for stack, seconds in probe.sampler.wall_s()
+        for stack, seconds in probe.sampler.cpu_s()
         for whose in (probe.attribute(stack),)
     )
     return TickCosts(
         rows=costs_of(samples, probe.nodes, 1e3 * plain_s),
         tick_s=scenario.tick_s,
         tick_ms=1e3 * plain_s,
+        wall_tick_ms=1e3 * probe.wall_tick_s("plain"),
         sampling=sampled_s / plain_s - 1.0,
         samples=probe.sampler.samples,
-        transport_ms=1e3 * probe.transport_floor_s(),
+        hand_over_ms=1e3 * probe.hand_over_floor_s(),
+        middleware_ms=1e3 * probe.middleware_floor_s(),
         arithmetic_ms=1e3 * probe.arithmetic_floor_s(),
     )

@@ -157,6 +157,7 @@ class LocalDelivery:
         self._lines: dict[str, Line] = {}
         self._queue: deque[tuple[Callable[[Any], None], Any, LocalReader]] = deque()
         self._under_way = False
+        self._to_go_on = False
         self._executor: Any = None
         self._unsettled: list[tuple[Line, Callable[[], None]]] = []
 
@@ -229,8 +230,12 @@ class LocalDelivery:
         self._queue.extend(waiting)
 
     def run(self) -> None:
-        """Hand over what waits, and what comes of it; long work is done in turns."""
-        if self._under_way:
+        """Hand over what waits, and what comes of it; long work is done in turns.
+
+        Between two turns the executor serves the outside: what it calls must not begin a turn of
+        its own, or a message from there would have to wait a turn for each one before it.
+        """
+        if self._under_way or self._to_go_on:
             return
         self._under_way = True
         until_s = time.monotonic() + _TURN_S
@@ -249,4 +254,9 @@ class LocalDelivery:
         finally:
             self._under_way = False
             if queue and self._executor is not None:
-                self._executor.create_task(self.run)
+                self._to_go_on = True
+                self._executor.create_task(self._go_on)
+
+    def _go_on(self) -> None:
+        self._to_go_on = False
+        self.run()

@@ -15,7 +15,7 @@ from rail_msgs_py.topics.tick import CLOCK
 
 from .attribution import Attribution, Attributor, kind_of, modules_by_file
 from .recorded_calls import CallRecorder, replay_s
-from .recorded_messages import MessageRecorder
+from .recorded_messages import Carried, MessageRecorder
 from .sampler import Sampler, Stack
 from .schedule import Phase, Schedule
 from .transport_floor import MiddlewareLoop, hand_over_s
@@ -24,9 +24,7 @@ from .transport_floor import MiddlewareLoop, hand_over_s
 _REPORT: Final = ("rail_corridor.report", "rail_corridor.run_data")
 #: Calls the callbacks of nodes.
 _HANDS_OVER: Final = LocalDelivery.run.__code__
-_ROUNDS: Final = 5
-#: Wall time after which no further round begins.
-_ENOUGH_S: Final = 2.0
+_ROUNDS: Final = 3
 
 
 class TickProbe:
@@ -47,8 +45,10 @@ class TickProbe:
         self._wall_s: dict[Phase, float] = defaultdict(float)
         self.ticks: Counter[Phase] = Counter()
         self.sampler = Sampler()
-        self._messages: list[MessageRecorder] = []
-        self._calls: list[CallRecorder] = []
+        self._hand_over_s = self._arithmetic_s = 0.0
+        #: What the middleware carries, and what it was given tick by tick.
+        self._carried: dict[str, Carried] = {}
+        self._given: list[list[tuple[str, bytes]]] = []
         #: Nodes of each kind.
         self.nodes: Counter[str] = Counter()
 
@@ -81,27 +81,38 @@ class TickProbe:
 
     def _begin(self, phase: Phase) -> None:
         if phase == "recorded":
-            self._messages.append(MessageRecorder(self._context.delivery, self._nodes))
-            self._messages[-1].start()
-            self._calls.append(CallRecorder(self._modules, _HANDS_OVER, besides=_REPORT))
-            self._calls[-1].start()
+            self._messages = MessageRecorder(self._context.delivery, self._nodes)
+            self._messages.start()
+            self._calls = CallRecorder(self._modules, _HANDS_OVER, besides=_REPORT)
+            self._calls.start()
         elif phase == "sampled":
             self.sampler.start()
 
     def _end(self, phase: Phase) -> None:
         if phase == "recorded":
-            self._calls[-1].stop()
-            self._messages[-1].stop()
+            self._calls.stop()
+            self._messages.stop()
+            self._measure_floors()
             gc.collect()
             gc.freeze()  # what has been recorded stays: no need to look through it in every tick
         elif phase == "sampled":
             self.sampler.stop()
 
+    def _measure_floors(self) -> None:
+        """Do again what was recorded, here and now: the machine's speed drifts in the run."""
+        calls, messages = self._calls.calls, self._messages
+        self._arithmetic_s += _typical_s(lambda: replay_s(calls))
+        self._hand_over_s += _typical_s(
+            lambda: sum(hand_over_s(tick.local, messages.readers) for tick in messages.ticks)
+        )
+        self._carried |= messages.carried
+        self._given += [tick.carried for tick in messages.ticks]
+
     def finish(self) -> None:
         """End what is under way, after a run that has ended at any time."""
         if self._phase == "recorded":  # a stretch that is not whole
-            self._calls.pop().stop()
-            self._messages.pop().stop()
+            self._calls.stop()
+            self._messages.stop()
         self.sampler.stop()
 
     @property
@@ -124,36 +135,25 @@ class TickProbe:
 
     def hand_over_floor_s(self) -> float:
         """CPU time to hand over the messages of a tick, past the middleware, to idle readers."""
-        return self._of_a_tick(
-            lambda: sum(
-                hand_over_s(tick.local, stretch.readers)
-                for stretch in self._messages
-                for tick in stretch.ticks
-            )
-        )
+        return self._hand_over_s / self.ticks["recorded"]
 
     def middleware_floor_s(self) -> float:
-        """CPU time to carry those messages of a tick that the middleware is given."""
-        topics = {name: what for one in self._messages for name, what in one.carried.items()}
-        with MiddlewareLoop(topics) as loop:
-            return self._of_a_tick(
-                lambda: sum(
-                    loop.carry_s(tick.carried)
-                    for stretch in self._messages
-                    for tick in stretch.ticks
-                )
-            )
+        """CPU time to carry those messages of a tick that the middleware is given.
+
+        It is measured here, with nodes of its own.
+        """
+        with MiddlewareLoop(self._carried) as loop:
+            carried_s = _typical_s(lambda: sum(map(loop.carry_s, self._given)))
+        return carried_s / self.ticks["recorded"]
 
     def arithmetic_floor_s(self) -> float:
         """CPU time of the arithmetic of a tick, one call after the other."""
-        return self._of_a_tick(lambda: sum(replay_s(one.calls) for one in self._calls))
+        return self._arithmetic_s / self.ticks["recorded"]
 
-    def _of_a_tick(self, measure_s: Callable[[], float]) -> float:
-        measure_s()  # kernels may be compiled for other arrays than those of the run
-        begin_s, rounds = time.perf_counter(), [measure_s()]
-        while len(rounds) < _ROUNDS and time.perf_counter() - begin_s < _ENOUGH_S:
-            rounds.append(measure_s())
-        return statistics.median(rounds) / self.ticks["recorded"]
+
+def _typical_s(measure_s: Callable[[], float]) -> float:
+    measure_s()  # kernels may be compiled for other arrays than those of the run
+    return statistics.median(measure_s() for _ in range(_ROUNDS))
 
 
 def _raise(error: Exception) -> None:

@@ -16,20 +16,19 @@ from .attribution import stage_of
 
 
 class Call(NamedTuple):
-    """One call; what it was given is as it was before the first call that was recorded."""
+    """One call, with copies of what it was given before the first call that was recorded."""
 
     function: Callable[..., Any]
     positional: list[Any]
     keywords: dict[str, Any]
-    #: Whether it was given copies, not what the nodes go on with.
-    copied: bool
 
 
 class CallRecorder:
     """Records the calls that lead from other code into arithmetic, in the order of the calls.
 
     What a recorded call does inside is part of it. Functions that cannot be found by their name, as
-    those within others, are not recorded, but what they call is.
+    those within others, and calls with what cannot be copied, are not recorded, but what they call
+    is.
 
     Parameters
     ----------
@@ -70,9 +69,10 @@ class CallRecorder:
                 self._inside = None
         elif event == "call" and self._is_arithmetic(frame.f_code):
             function = function_of(frame) if self._counts(frame) else None
-            if function is not None:
+            call = None if function is None else self._call(function, frame)
+            if call is not None:
                 self._inside = frame
-                self.calls.append(self._call(function, frame))
+                self.calls.append(call)
 
     def _is_arithmetic(self, code: CodeType) -> bool:
         found = self._arithmetic.get(code)
@@ -90,18 +90,18 @@ class CallRecorder:
             frame = frame.f_back
         return self._within is None
 
-    def _call(self, function: Callable[..., Any], frame: FrameType) -> Call:
+    def _call(self, function: Callable[..., Any], frame: FrameType) -> Call | None:
         arguments = arguments_of(frame)
         # A copy that fails midway must leave nothing behind that a later one finds.
         trial: Any = ChainMap({}, self._copies)
         try:
             positional, keywords = copy.deepcopy(arguments, trial)
         except Exception:
-            return Call(function, *arguments, copied=False)
+            return None
         # Under the number of the memo itself are the originals, which keep their numbers that way.
         self._originals.append(trial.maps[0].pop(id(trial), None))
         self._copies.update(trial.maps[0])
-        return Call(function, positional, keywords, copied=True)
+        return Call(function, positional, keywords)
 
 
 def arguments_of(frame: FrameType) -> tuple[list[Any], dict[str, Any]]:
@@ -150,12 +150,8 @@ def replay_s(calls: list[Call]) -> float:
     One that fails, because what it works on has been changed by others than the calls recorded,
     counts for as long as it took.
     """
-    given = [(call.positional, call.keywords) for call in calls if call.copied]
-    fresh = iter(copy.deepcopy(given))
-    prepared = [
-        (call.function, *(next(fresh) if call.copied else (call.positional, call.keywords)))
-        for call in calls
-    ]
+    given = copy.deepcopy([(call.positional, call.keywords) for call in calls])
+    prepared = [(call.function, *one) for call, one in zip(calls, given, strict=True)]
     collects = gc.isenabled()
     gc.disable()  # it would look through all of the copies
     begin_s = time.thread_time()

@@ -56,14 +56,16 @@ class Sampler:
         self._begins: dict[int, int] = {}
         self._last_s = 0.0
         self._under_way = False
+        #: Whether a sample is being taken, which may last until the next one is due.
+        self._sampling = False
 
     def start(self) -> None:
         """Sample from now on."""
         self._before = signal.signal(signal.SIGALRM, self._sample)
         signal.siginterrupt(signal.SIGALRM, False)  # threads of the middleware wait on
         self._under_way = True
-        signal.setitimer(signal.ITIMER_REAL, INTERVAL_S, INTERVAL_S)
         self._last_s = time.thread_time()
+        signal.setitimer(signal.ITIMER_REAL, INTERVAL_S, INTERVAL_S)
 
     def stop(self) -> None:
         """Sample no longer; does no harm if it was not started."""
@@ -83,8 +85,9 @@ class Sampler:
 
     def _sample(self, _: int, frame: FrameType | None) -> None:
         now_s = time.thread_time()
-        if not self._under_way:
+        if not self._under_way or self._sampling:
             return
+        self._sampling = True
         functions: list[CodeType] = []
         instruction, reader = -1 if frame is None else frame.f_lasti, None
         while frame is not None:
@@ -94,6 +97,7 @@ class Sampler:
             frame = frame.f_back
         self._samples.append(_Sample(functions, instruction, reader, now_s - self._last_s))
         self._last_s = time.thread_time()
+        self._sampling = False
 
     def _add(self, sample: _Sample) -> None:
         functions = sample.functions

@@ -84,10 +84,10 @@ class Sampler:
         return [(self._stacks[key], seconds) for key, seconds in self._cpu_s.items()]
 
     def _sample(self, _: int, frame: FrameType | None) -> None:
-        now_s = time.thread_time()
         if not self._under_way or self._sampling:
             return
-        self._sampling = True
+        self._sampling = True  # first: the system call is where the next signal is met
+        now_s = time.thread_time()
         functions: list[CodeType] = []
         instruction, reader = -1 if frame is None else frame.f_lasti, None
         while frame is not None:

@@ -13,6 +13,7 @@ import dis
 import signal
 import time
 from collections import defaultdict
+from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any, Final, NamedTuple
 
@@ -22,6 +23,7 @@ from rail_msgs_py.delivery import LocalDelivery
 INTERVAL_S: Final = 0.001
 
 _HANDS_OVER: Final = LocalDelivery.run.__code__
+_OF_THE_PROFILE: Final = Path(__file__).parent
 _RESUME: Final = dis.opmap.get("RESUME")  # from Python 3.11 on
 
 
@@ -103,6 +105,8 @@ class Sampler:
         functions = sample.functions
         if len(functions) > 1 and sample.instruction <= self._begin(functions[0]):
             functions = functions[1:]  # a function that just begins has done nothing yet
+        if Path(functions[0].co_filename).parent == _OF_THE_PROFILE:
+            return  # what starts and stops the samples belongs to no tick
         reader = "" if sample.reader is None else type(sample.reader.node).__module__
         key: tuple[int | str, ...] = (reader, *map(id, functions))
         self._cpu_s[key] += sample.seconds

@@ -129,6 +129,40 @@ def _group(file: str, tests: str, *faults: tuple[str, str, str]) -> list[Mutant]
 
 _REPORTS = "rail_corridor/equipment"
 MUTANTS: list[Mutant] = [
+    # The tick, its start, and what nodes say of themselves.
+    *_group(
+        "rail_msgs_py/rail_msgs_py/inbox.py",
+        "rail_msgs_py/test_inbox.py rail_msgs_py/test_tick_inputs.py",
+        (
+            "a closed tick can be filled again",
+            "self._latest_taken_ns = max(self._latest_taken_ns, stamp_ns)",
+            "pass",
+        ),
+    ),
+    *_group(
+        "rail_world/rail_world/world_node.py",
+        "nodes/test_world_node.py",
+        ("whoever waits is left behind", "if left > 0:", "if left > 99:"),
+        (
+            "one sign of failure is enough to begin",
+            "self._absent and not silent and",
+            "self._absent or",
+        ),
+    ),
+    *_group(
+        f"{CORRIDOR}/report/intake.py",
+        "rail_corridor/report/test_intake.py",
+        (
+            "repeats are events",
+            "if self._health.get(status.name) == (status.level, status.message):",
+            "if False:",
+        ),
+        (
+            "what stands is forgotten",
+            'self._standing.discard(self._said.get(status.hardware_id, b""))',
+            "pass",
+        ),
+    ),
     # Counters and thresholds of the report.
     *_group(
         f"{EQUIPMENT}/ranging/report.py",

@@ -7,15 +7,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.qos import QoSProfile
+from std_msgs.msg import String
 
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plan.plan import WORLD, Plan, make_plan
+from rail_msgs_py.failures import failure
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.position import Position
 from rail_msgs_py.stamps import clock_from_cdr, to_ns
 from rail_msgs_py.table import Table
-from rail_msgs_py.topics.tick import CLOCK, DONE, FINISHED
+from rail_msgs_py.topics.tick import (
+    CLOCK,
+    DONE,
+    FAILED,
+    FINISHED,
+    NO_READER,
+    NO_SENDER,
+    READY,
+    WAITING,
+)
 from rail_msgs_py.topics.world import CORRIDOR_MARKERS, CORRIDOR_PATH, STATE, TRUTH
 from rail_world.world_node import WorldNode
 
@@ -129,6 +141,58 @@ def test_it_waits_for_nodes_to_be_ready_but_not_for_ever(graph: Any, plan: Plan)
     world = World(graph, plan, ticks=1, sinks=(), nodes=("/late",), start_timeout_s=0.1)
     graph.wait(lambda: world.finished)
     assert [status.name for status in graph.failed] == ["/late"]
+
+
+def waits(node: str, **topics: str) -> DiagnosticStatus:
+    values = [KeyValue(key=f"/{topic}/done", value=lacks) for topic, lacks in topics.items()]
+    return DiagnosticStatus(name=node, values=values)
+
+
+def test_it_begins_once_nobody_is_left_to_wait_for(graph: Any, plan: Plan) -> None:
+    # One has failed, one waits for what only that one could be, one is late to be ready.
+    waiting, failed, ready = graph.sender(WAITING), graph.sender(FAILED), graph.sender(READY)
+    nodes = ("/gone", "/waiter", "/late")
+    world = World(graph, plan, ticks=1, sinks=(), nodes=nodes)
+    waiting(waits("/waiter", gone=NO_SENDER, nobody=NO_READER))
+    failed(failure("/gone", "died", "the launcher"))
+    graph.wait(lambda: len(graph.failed) == 1)
+    assert not world.clock
+    ready(String(data="/late"))
+    graph.wait(lambda: world.finished)
+    assert [status.name for status in graph.failed] == ["/gone"]
+
+
+def test_what_somebody_living_can_be_is_waited_for_and_then_done_without(
+    graph: Any, plan: Plan
+) -> None:
+    graph.bystander.create_publisher(DONE.type, DONE.name(node="/living"), DONE.qos)
+    waiting, failed = graph.sender(WAITING), graph.sender(FAILED)
+    world = World(graph, plan, ticks=1, sinks=(), nodes=("/gone", "/waiter"), start_timeout_s=0.5)
+    waiting(waits("/waiter", living=NO_SENDER))
+    failed(failure("/gone", "died", "the launcher"))
+    graph.wait(lambda: world.finished)
+    assert [status.name for status in graph.failed] == ["/gone"]
+    messages = [s.message for array in graph.diagnostics for s in array.status]
+    assert "begins although /waiter waits for /living/done" in messages
+
+
+def test_who_is_given_up_does_not_let_the_clock_run_ahead_of_the_others(
+    graph: Any, plan: Plan
+) -> None:
+    failed = graph.sender(FAILED)
+    world = World(graph, plan, ticks=3, nodes=("/sink_b",))
+    failed(failure("/sink_b", "died", "the launcher"))
+    for tick in range(3):
+        world.ticks(tick + 1)
+        assert len(world.clock) == tick + 1
+        if tick == 1:  # of a tick that is over: it lives, and is waited for again
+            world.finish(0, "/sink_b")
+            world.finish(1, "/sink_b")
+        world.finish(tick, "/sink_a")
+        if tick == 2:
+            world.finish(2, "/sink_b")
+    graph.wait(lambda: world.finished)
+    assert [status.name for status in graph.failed] == ["/sink_b"]
 
 
 def test_late_joiners_learn_the_map_and_the_end(graph: Any, plan: Plan) -> None:

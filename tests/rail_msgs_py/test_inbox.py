@@ -100,6 +100,26 @@ def test_a_tick_can_be_taken_before_it_is_complete() -> None:
     assert inbox.take() == (0, {"c": "c0"})
 
 
+def test_a_tick_whose_missing_ports_have_gone_on_waits_for_nothing_more() -> None:
+    inbox: TickInbox[str] = TickInbox(PORTS)
+    inbox.put(0, "a", "a0")
+    inbox.put(1, "b", "b1")
+    assert not inbox.complete  # c may still bring its own
+    inbox.put(1, "c", "c1")
+    assert inbox.take() == (0, {"a": "a0"})
+    assert (inbox.complete, inbox.missing) == (False, ("a",))
+
+
+def test_a_closed_tick_takes_nothing_but_signs_of_life() -> None:
+    inbox: TickInbox[str] = TickInbox(["a", "b"])
+    inbox.put(0, "a", "a0")
+    inbox.put(2, "a", "a2")
+    inbox.drop(["b"])
+    inbox.close(1)
+    inbox.put(1, "b", "b1")
+    assert (inbox.stamp_ns, inbox.missing) == (2, ("b",))
+
+
 def test_with_every_port_dropped_nothing_is_awaited() -> None:
     inbox: TickInbox[str] = TickInbox(PORTS)
     assert inbox.awaits_anything

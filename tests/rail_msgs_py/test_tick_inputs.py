@@ -30,6 +30,7 @@ class Recorder:
 
     def __init__(self) -> None:
         self.now_s = 0.0
+        self.times: list[int] = []
         self.feed: dict[str, Callable[[bytes], None]] = {}
         self.failed: list[tuple[str, str]] = []
         self.listens: list[Topic] = []
@@ -58,11 +59,11 @@ class Recorder:
     def every(self, period_s: float, callback: Callable[[], None]) -> None:
         self._timers.append(callback)
 
-    def at_tick(self, stamp_ns: int) -> None:
-        """Take the time; the health of a node is tested elsewhere."""
-
     def steady_s(self) -> float:
         return self.now_s
+
+    def at_tick(self, stamp_ns: int) -> None:
+        self.times.append(stamp_ns)
 
     def get_fully_qualified_name(self) -> str:
         return "/node"
@@ -258,6 +259,26 @@ def test_a_leg_that_raises_does_not_hold_up_the_next_tick(node: Recorder, failin
     legs.fails = False
     legs.feed("clock", "up", "down", tick=1)
     assert legs.log[-2:] == [("first", 1), ("second", 1)]
+
+
+def test_the_node_is_told_the_time_once_a_tick(node: Recorder) -> None:
+    legs = TwoLegs(node)
+    for tick in range(2):
+        legs.feed("clock", "up", "down", tick=tick)
+    assert node.times == [0, TICK_NS]
+
+
+def test_who_joins_in_the_midst_of_a_run_falls_in_step(node: Recorder) -> None:
+    ports = open_circuits(node, TickInputs(node, node.step, TIMEOUT_S))
+    # Connected one after the other: of the first tick it hears one sender, of the next all.
+    node.feed[ports["tc1"]](occupancy("tc1", 57))
+    node.feed["/clock"](clock(57))
+    node.feed["/clock"](clock(58))
+    for circuit, port in ports.items():
+        node.feed[port](occupancy(circuit, 58))
+    assert [stamp_ns // TICK_NS for stamp_ns, _ in node.ticks] == [57, 58]
+    assert set(node.ticks[1][1]) == {"/clock", *ports.values()}
+    assert node.failed == []
 
 
 def test_decoders_give_stamp_and_item() -> None:

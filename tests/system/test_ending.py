@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -78,3 +79,59 @@ def test_a_signal_while_it_connects_ends_it_too(rail: Rail, listener: Listener) 
     run.send_signal(signal.SIGTERM)
     assert rail.finish(run) == 128 + signal.SIGTERM
     assert not rail.processes()
+
+
+@pytest.mark.parametrize("begun", [False, True], ids=["connecting", "running"])
+def test_hundreds_of_nodes_in_one_process_end_at_once(
+    rail: Rail, listener: Listener, *, begun: bool
+) -> None:
+    scenario = {
+        "name": "long_line",
+        "seed": 1,
+        "duration_s": 300.0,
+        "tracks": {"main": {"elements": [{"straight_m": 26_000.0}], "speed_limits": [[0, 80]]}},
+        "stations": {"zone_length_m": 200.0},
+        "trains": [
+            {"name": f"t{number}", "route": ["main"], "start_m": 200.0 * number + 150.0}
+            for number in range(100)
+        ],
+    }
+    path, report = rail.directory / "long_line.yaml", rail.directory / "report.json"
+    path.write_text(json.dumps(scenario))
+    clock = listener.listen(CLOCK)
+    run = rail.start("run", path, "--processes", "one", "--report", report)
+    if begun:
+        listener.until(lambda: len(clock) > 3)
+    else:
+        listener.until(lambda: listener.node.count_publishers("/diagnostics") > 20)
+    asked_s = time.monotonic()
+    run.send_signal(signal.SIGINT)
+    assert rail.finish(run) == 128 + signal.SIGINT
+    # Taking leave of all of them one by one takes five to twenty seconds.
+    assert time.monotonic() - asked_s < 3.0
+    assert json.loads(report.read_text())["nodes"] > 220
+    assert not rail.processes()
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "number", "code"),
+    [
+        ("wayside", "onboard", signal.SIGINT, 128 + signal.SIGINT),
+        ("onboard", "wayside", signal.SIGTERM, 128 + signal.SIGTERM),
+        ("onboard", "wayside", signal.SIGKILL, -signal.SIGKILL),
+    ],
+)
+def test_the_halves_of_a_corridor_end_together(
+    rail: Rail, listener: Listener, first: str, second: str, number: signal.Signals, code: int
+) -> None:
+    clock = listener.listen(CLOCK)
+    arguments = ("run", "branch", "--rate", 2, "--processes", "site", "--only")
+    halves = {part: rail.start(*arguments, part) for part in (first, second)}
+    listener.until(lambda: len(clock) > 3)
+    asked_s = time.monotonic()
+    halves[first].send_signal(number)
+    assert rail.finish(halves[first]) == code
+    assert rail.finish(halves[second]) == 3
+    assert time.monotonic() - asked_s < 10.0
+    line = f"the other half of the corridor, {first}, has ended: so does this one"
+    assert line in rail.output(halves[second])

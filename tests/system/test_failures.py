@@ -43,7 +43,7 @@ def test_a_killed_process_is_named_and_the_corridor_goes_on(
     listener.until(lambda: node in {message.name for message in failed})
     # It goes on: three more seconds of simulated time pass.
     listener.until(lambda: to_ns(clock[-1].clock) > killed_ns + 3_000_000_000)
-    assert rail.finish(run) == 0
+    assert rail.finish(run) == 4
     report = json.loads(path.read_text())
     assert report["complete"]
     assert report["ticks"] == 150

@@ -294,6 +294,15 @@ class Equipment(CorridorMixin, LifecycleNode):  # type: ignore[misc]
         self.trigger_configure()
         self.trigger_activate()
 
+    def destroy_node(self) -> None:
+        """Destroy the node with its state machine.
+
+        rclpy 7.1 leaves that to the collector. It holds the node: a process that ends before would
+        not take leave, and others would take it for alive until its lease is over, 20 s later.
+        """
+        super().destroy_node()
+        self._state_machine = None
+
     def _LifecycleNodeMixin__on_change_state(self, request: Any, response: Any) -> Any:
         """Answer the service; takes the place of rclpy's own function.
 

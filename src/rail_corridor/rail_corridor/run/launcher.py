@@ -19,7 +19,13 @@ from rail_corridor.equipment.registry import node_kinds
 from rail_corridor.loading.scenario_files import files_of
 from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.middleware.domain import sole_corridor
-from rail_corridor.plan.plan import REPORT, WORLD, Plan, check_external, make_plan
+from rail_corridor.plan.plan import (
+    REPORT,
+    WORLD,
+    Plan,
+    check_external,
+    make_plan,
+)
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
 from rail_corridor.report.intake import names_read
@@ -32,6 +38,7 @@ from .host import destroy_nodes, make_context, make_nodes, run_nodes
 from .kernels import compile_before_the_first_run
 from .kills import FaultInjector, check_kills, killed_nodes
 from .options import RunOptions, check_recording, default_placement
+from .other_half import OtherHalf
 from .parameter_services import ParameterServicesOnDemand
 from .processes import ProcessGroup, remove_orphaned_segments
 from .progress import progress_of
@@ -47,8 +54,6 @@ DRAIN_S = 20.0
 SETTLE_S = 0.3
 #: Wall time for the nodes of this process to leave, after a signal.
 LEAVE_S = 0.5
-#: Wall time between two looks at whether the other half of a corridor is there.
-_LOOK_S = 0.5
 #: Exit codes: the other half of a corridor has ended first; nodes have failed.
 HALF_GONE, NODES_FAILED = 3, 4
 
@@ -116,9 +121,9 @@ class _LaunchedRun:
         #: Whether some nodes of this process could not be destroyed in time: it must not tidy up.
         self.nodes_left = False
         ours = {spec.name for specs in self._groups.values() for spec in specs}
-        self._others = {spec.name for spec in plan.nodes} - ours - {*options.external}
-        self._half_seen = self._half_gone = False
-        self._looked_s = 0.0
+        # Of the wayside the world, without which nothing goes on.
+        others = {spec.name for spec in plan.nodes} - ours - {*options.external}
+        self._other_half = OtherHalf(others & {WORLD} or others)
         self._observer: Any = None
         self._progress: Progress | None = None
         self._bar: TaskID | None = None
@@ -225,10 +230,10 @@ class _LaunchedRun:
         executor = EventsExecutor(context=context)
         for node in nodes:
             executor.add_node(node)
+        self._arrange_kills(executor, nodes)
         if self._options.probe is not None:
             self._options.probe(nodes, context)
         context.delivery.settle(executor)
-        self._arrange_kills(executor, nodes)
         with progress_of(self._console) as self._progress:
             total_s = self._plan.ticks * self._plan.tick_s
             self._bar = self._progress.add_task("connecting", total=total_s, speed="")
@@ -317,22 +322,11 @@ class _LaunchedRun:
     @property
     def _interrupted(self) -> bool:
         """Whether the run has ended before its time."""
-        return bool(self._signal) or self._world_failed or self._half_gone
+        return bool(self._signal) or self._world_failed or self._other_half.gone
 
     def _look_for_the_other_half(self) -> None:
-        """Note that the other half of the corridor has been there and is no longer."""
-        observer = self._observer
-        now_s = observer.steady_s()
-        if now_s - self._looked_s < _LOOK_S:
-            return
-        self._looked_s = now_s
-        names = [
-            f"{space.rstrip('/')}/{n}" for n, space in observer.get_node_names_and_namespaces()
-        ]
-        if names.count(REPORT) > 1 or not self._others.isdisjoint(names):
-            self._half_seen = True
-        elif self._half_seen and not self._half_gone:
-            self._half_gone = True
+        """End with the other half of the corridor."""
+        if self._other_half.look(self._observer):
             other = "onboard" if self._options.only == "wayside" else "wayside"
             line = f"the other half of the corridor, {other}, has ended: so does this one"
             self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)
@@ -381,7 +375,7 @@ class _LaunchedRun:
             return 1
         if self._signal:
             return 128 + self._signal
-        if self._half_gone:
+        if self._other_half.gone:
             return HALF_GONE
         return NODES_FAILED if self._unplanned_failures() else 0
 

@@ -1,0 +1,39 @@
+"""The other half of a corridor that runs on two hosts: whether it has been there, and has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any, Final
+
+#: Wall time between two looks [s].
+_LOOK_S: Final = 0.5
+
+
+class OtherHalf:
+    """Looks for the nodes of others in the graph.
+
+    Parameters
+    ----------
+    nodes : collection of str
+        Full names of those that tell: as long as one of them is there, the half is.
+    """
+
+    def __init__(self, nodes: Collection[str]) -> None:
+        self._nodes = frozenset(nodes)
+        self._seen = False
+        self._looked_s = 0.0
+        #: Whether it has been there and is no longer.
+        self.gone = False
+
+    def look(self, node: Any) -> bool:
+        """Look, now and then, through the eyes of a node: whether it is found gone just now."""
+        now_s = node.steady_s()
+        if self.gone or now_s - self._looked_s < _LOOK_S:
+            return False
+        self._looked_s = now_s
+        names = (f"{space.rstrip('/')}/{n}" for n, space in node.get_node_names_and_namespaces())
+        if not self._nodes.isdisjoint(names):
+            self._seen = True
+        elif self._seen:
+            self.gone = True
+        return self.gone

@@ -1,7 +1,7 @@
 """Simulated seconds per second of the whole corridor, and how it grows with stations and trains.
 
-The peer is real time. The bound is the rate at which transport alone and arithmetic alone,
-measured in the same run, would go one after the other in one process.
+The peer is real time. The bound is the rate at which transport alone and arithmetic alone would go
+one after the other in one process: the floors of `rail profile`, of the same run.
 """
 
 from __future__ import annotations
@@ -14,18 +14,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from arithmetic_floor import arithmetic_ms
-from in_process import plan_of
-from transport_floor import transport_ms
-
 from rail_corridor.loading.loader import load_scenario, scenario_from_data
 from rail_corridor.scenario.model import Scenario
-from rail_world.ranging.description import RadioDescription
 
 #: Stations and trains of the rows `corridor.scale_*`.
 SCALES = ((10, 5), (30, 5), (114, 1), (114, 5), (114, 10), (114, 20))
 ZONE_M = 200.0
-_FLOOR_TICKS = 100
 
 
 def rows(names: tuple[str, ...] = ()) -> Iterator[dict[str, Any]]:
@@ -66,41 +60,36 @@ def line(stations: int, trains: int, seconds: float = 30.0) -> Scenario:
 
 
 def _row(name: str, scenario: Scenario) -> dict[str, Any]:
-    report = _run(scenario)
-    plan = plan_of(scenario)
-    antennas = plan.world.part("ranging", RadioDescription).stations
-    zones, trains = len(antennas), len(scenario.trains)
-    channels = len({antenna.downlink_channel for antenna in antennas})
-    transport = transport_ms(
-        zones, trains, channels, min(2, channels), scenario.ranging.samples, _FLOOR_TICKS
-    )
-    arithmetic = arithmetic_ms(scenario, plan, min(_FLOOR_TICKS, scenario.ticks))
+    found = _profile(scenario)
+    tick_ms = scenario.tick_s * 1e3
+    transport_ms, arithmetic_ms = found["transport_floor_ms"], found["arithmetic_floor_ms"]
     return {
         "name": name,
         "unit": "x real time",
-        "ours": report["real_time_factor"],
+        "ours": tick_ms / found["wall_tick_ms"],
         "peer_name": "real time",
         "peer": 1.0,
-        "ratio": report["real_time_factor"],
-        "bound": scenario.tick_s * 1e3 / (transport + arithmetic),
-        "transport_ms_per_tick": transport,
-        "arithmetic_ms_per_tick": arithmetic,
+        "ratio": tick_ms / found["wall_tick_ms"],
+        "bound": tick_ms / (transport_ms + arithmetic_ms),
+        "ms_per_tick": found["tick_ms"],
+        "transport_ms_per_tick": transport_ms,
+        "arithmetic_ms_per_tick": arithmetic_ms,
     }
 
 
-def _run(scenario: Scenario) -> dict[str, Any]:
-    """Report of a run of its own, as a user starts it, in one process."""
+def _profile(scenario: Scenario) -> dict[str, Any]:
+    """Profile of a run of its own, in one process."""
     with tempfile.TemporaryDirectory() as folder:
-        path, report = Path(folder) / "scenario.yaml", Path(folder) / "report.json"
+        path, figures = Path(folder) / "scenario.yaml", Path(folder) / "figures.json"
         path.write_text(scenario.to_json())  # JSON is YAML
-        command = [sys.executable, "-m", "rail_corridor.cli.main", "run", str(path)]
+        command = [sys.executable, "-m", "rail_corridor.cli.main", "profile", str(path)]
         subprocess.run(
-            [*command, "--processes", "one", "--report", str(report)],
+            [*command, "--json", str(figures), "--flame", str(Path(folder) / "flame.html")],
             check=True,
             stdout=subprocess.DEVNULL,
             timeout=1800,
         )
-        return dict(json.loads(report.read_text()))
+        return dict(json.loads(figures.read_text()))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Generic, Protocol, TypeVar
 
@@ -164,6 +164,11 @@ class LocalDelivery:
     def line(self, name: str) -> Line:
         """Line of the topic of an absolute name."""
         return self._lines.setdefault(name, Line())
+
+    @property
+    def lines(self) -> Mapping[str, Line]:
+        """Lines by the absolute names of their topics."""
+        return self._lines
 
     def read(self, name: str, reader: LocalReader, subscribe: Callable[[], None]) -> Line:
         """Add a reader; ``subscribe`` connects it to the outside if nobody here sends to it."""

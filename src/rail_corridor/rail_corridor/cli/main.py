@@ -312,6 +312,47 @@ def bench(
     raise typer.Exit(run_benchmarks(tuple(names or ()), json))
 
 
+@app.command()
+def profile(
+    scenario: ScenarioArgument,
+    duration: DurationOption = None,
+    seed: SeedOption = None,
+    track: TrackOption = None,
+    trains: TrainsOption = None,
+    zone_length: ZoneOption = None,
+    reverse: ReverseOption = False,
+    flame: Annotated[
+        Path | None,
+        typer.Option(
+            "--flame",
+            help="File of the flame graph, SCENARIO.flame.html if none is named. It opens in any "
+            "browser: Timeline is the graph, Call stack the same as a list. One that ends in "
+            ".json opens on www.speedscope.app, Left Heavy.",
+            metavar="FILE",
+        ),
+    ] = None,
+    json: Annotated[
+        Path | None, typer.Option("--json", help="Write the figures as JSON.", metavar="FILE")
+    ] = None,
+) -> None:
+    """Show where a tick goes, by kind of node and stage, beside the floor; all in one process."""
+    for option, path in (("--flame", flame), ("--json", json)):
+        if path is not None:
+            check_writable(option, path)
+    if flame is not None and flame.suffix not in (".html", ".json"):
+        raise UsageError(f"--flame: {flame}: must end in .html or .json")
+    loaded = _load(scenario, seed, duration, track, trains, zone_length, reverse)
+    if flame is None:
+        flame = Path(f"{loaded.name}.flame.html")
+        check_writable("--flame", flame)
+
+    from rich.console import Console
+
+    from rail_corridor.studies.tick_profile.profile import profile as profile_ticks
+
+    raise typer.Exit(profile_ticks(loaded, flame, json, Console()))
+
+
 add_studies(app)
 add_recordings(app)
 add_workshop(app)

@@ -231,6 +231,8 @@ class _LaunchedRun:
         for node in nodes:
             executor.add_node(node)
         self._arrange_kills(executor, nodes)
+        if self._options.probe is not None:
+            self._options.probe(nodes, context)
         context.delivery.settle(executor)
         with progress_of(self._console) as self._progress:
             total_s = self._plan.ticks * self._plan.tick_s
@@ -362,7 +364,8 @@ class _LaunchedRun:
 
     def _finish(self, report: dict[str, Any] | None) -> int:
         if report is not None:
-            print_report(report, self._console)
+            if self._options.probe is None:
+                print_report(report, self._console)
             if self._options.report is not None:
                 write_report(report, self._options.report)
                 self._console.print(f"report written to {self._options.report}")

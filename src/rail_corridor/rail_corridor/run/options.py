@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rail_corridor.errors import InputError
 from rail_corridor.plan.plan import Part, Placement, Plan
@@ -29,6 +31,9 @@ class RunOptions:
     record: Path | None = None
     switches: bool = False
     allow_failures: bool = False
+    #: Of a run in one process: is given its nodes and their context before they are spun. The
+    #: report is then not printed.
+    probe: Callable[[list[Any], Any], None] | None = None
 
     @property
     def with_external_nodes(self) -> bool:

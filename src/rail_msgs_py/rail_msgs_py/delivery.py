@@ -159,7 +159,7 @@ class LocalDelivery:
         self._under_way = False
         self._to_go_on = False
         self._executor: Any = None
-        self._unsettled: list[tuple[Line, Callable[[], None]]] = []
+        self._unsettled: list[Callable[[], None]] = []
 
     def line(self, name: str) -> Line:
         """Line of the topic of an absolute name."""
@@ -174,18 +174,27 @@ class LocalDelivery:
         """Add a reader; ``subscribe`` connects it to the outside if nobody here sends to it."""
         line = self.line(name)
         line.readers.append(reader)
-        if self._executor is None:
-            self._unsettled.append((line, subscribe))
-        elif not line.writers:
-            subscribe()
+
+        def subscribe_if_needed() -> None:
+            if not line.writers:
+                subscribe()
+
+        self.when_settled(subscribe_if_needed)
         return line
+
+    def when_settled(self, callback: Callable[[], None]) -> None:
+        """Call back once all nodes are made, at once if they are."""
+        if self._executor is None:
+            self._unsettled.append(callback)
+        else:
+            callback()
 
     def listen(self, name: str, listener: Listener) -> None:
         """Listen to a topic of many publishers, or a timer, by the one that the process has."""
         self._ears.setdefault(name, Ear()).add(listener)
 
     def settle(self, executor: Any) -> None:
-        """All nodes are made: subscribe outside to what nobody here sends.
+        """All nodes are made: what is sent and heard outside is known from now on.
 
         Parameters
         ----------
@@ -193,9 +202,8 @@ class LocalDelivery:
             Spins the nodes.
         """
         self._executor = executor
-        for line, subscribe in self._unsettled:
-            if not line.writers:
-                subscribe()
+        for callback in self._unsettled:
+            callback()
         self._unsettled.clear()
 
     def put(self, line: Line, message: Sendable, raw: bytes | None) -> None:

@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
@@ -78,11 +79,23 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
 
     def publisher(self, topic: Topic, **parts: object) -> CorridorPublisher:
         """Publisher of a topic of the table."""
-        publisher = self.create_publisher(topic.type, self.name_of(topic, **parts), topic.qos)
+        made: list[CorridorPublisher] = []
+
+        def on_matched(_: object) -> None:
+            for each in made:
+                each.look_outside()
+
+        publisher = self.create_publisher(
+            topic.type,
+            self.name_of(topic, **parts),
+            topic.qos,
+            event_callbacks=PublisherEventCallbacks(matched=on_matched),
+        )
         if publisher.topic_name in getattr(self.context, "report_reads", ()):
             self._await_report(publisher)
         tap = getattr(self.context, "tap", None)
-        return CorridorPublisher(topic, publisher, tap, self._delivery_of(topic))
+        made.append(CorridorPublisher(topic, publisher, tap, self._delivery_of(topic)))
+        return made[0]
 
     def _await_report(self, publisher: Any) -> None:
         """Wait until what is published is heard by the report, as by all readers known here."""

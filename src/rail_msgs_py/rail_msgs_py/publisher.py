@@ -38,13 +38,21 @@ class CorridorPublisher:
         if self._line is not None:
             self._line.writers += 1
         #: Sends a message, or its serialised form.
-        self.send: Send = self._sender(topic, sink, delivery)
-
-    def _sender(self, topic: Topic, sink: Sink | None, delivery: LocalDelivery | None) -> Send:
-        publish_raw, count, line = self._publisher.handle.publish_raw, self._count, self._line
-        put = None if delivery is None else delivery.put
+        self.send: Send = self._sender(sink, delivery)
+        # Whether the middleware has to carry it: until more is known it has.
+        self._carried = True
         # What is kept for those who come later is kept by the middleware.
-        selective = delivery is not None and (topic.qos is STREAM or topic.qos is ESTIMATE)
+        self._selective = delivery is not None and (topic.qos is STREAM or topic.qos is ESTIMATE)
+        if delivery is not None:
+            delivery.when_settled(self.look_outside)
+
+    def look_outside(self) -> None:
+        """Note whether somebody outside listens; to be called whenever that has changed."""
+        self._carried = not self._selective or self._count() > 0
+
+    def _sender(self, sink: Sink | None, delivery: LocalDelivery | None) -> Send:
+        publish_raw, line = self._publisher.handle.publish_raw, self._line
+        put = None if delivery is None else delivery.put
 
         def send(message: Sendable) -> None:
             raw = message if type(message) is bytes else None
@@ -53,7 +61,7 @@ class CorridorPublisher:
                 sink(raw)
             if put is not None and line is not None and line.readers:
                 put(line, message, raw)
-            if not selective or count():
+            if self._carried:
                 publish_raw(serialised(message) if raw is None else raw)
 
         return send

@@ -24,6 +24,17 @@ def deliver(arrivals: list[tuple[int, str]], inbox: TickInbox[tuple[int, str]]) 
     return taken
 
 
+@given(st.lists(st.tuples(st.integers(0, 3), st.sampled_from("abc"), st.booleans())))
+def test_putting_tells_what_is_complete(steps: list[tuple[int, str, bool]]) -> None:
+    inbox = TickInbox[int]("abc")
+    for tick, port, drop in steps:
+        if drop:
+            inbox.drop([port])
+        assert inbox.put(tick, port, 0) == inbox.complete
+        if inbox.complete:
+            inbox.take()
+
+
 def test_every_order_of_one_tick_gives_the_same() -> None:
     for order in itertools.permutations(PORTS):
         taken = deliver([(100, port) for port in order], TickInbox(PORTS))

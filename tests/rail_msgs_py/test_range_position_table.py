@@ -18,7 +18,7 @@ from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension
 from rail_msgs_py import position, table
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.ranging.range_reading import RangeReading, RangeWriter
+from rail_msgs_py.ranging.range_reading import RangeReading, RangeWriter, range_from_cdr
 from rail_msgs_py.stamps import clock_from_cdr, to_ns
 from rail_msgs_py.table import Table, TableWriter
 
@@ -46,6 +46,18 @@ def test_a_range_in_all_its_forms(reading: RangeReading) -> None:
     assert same(RangeReading.from_cdr(raw), reading)
     assert same(RangeReading.from_cdr(written), reading)
     assert same(RangeReading.from_msg(deserialize_message(written, Range)), reading)
+
+
+#: What a station computes, with one digit more than the message can carry.
+COMPUTED = st.sampled_from([math.inf, math.nan, 0.1, 123.456789012345, -1e-40, 3.4e38])
+
+
+@given(STAMPS, COMPUTED, COMPUTED)
+def test_a_range_is_the_same_in_the_process_and_outside(
+    stamp_ns: int, range_m: float, variance_m2: float
+) -> None:
+    view = RangeWriter("zone1", 0.0, 400.0).view(stamp_ns, range_m, variance_m2)
+    np.testing.assert_equal(tuple(view)[:3], range_from_cdr(view.to_cdr()))
 
 
 @pytest.mark.parametrize(

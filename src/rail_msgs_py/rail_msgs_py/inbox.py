@@ -37,20 +37,30 @@ class TickInbox(Generic[Item]):
         self._awaited.add(port)
         self._find_first()
 
-    def put(self, stamp_ns: int, port: str, item: Item) -> None:
-        """Add an item; one of a tick already taken only shows that its port is alive again."""
+    def put(self, stamp_ns: int, port: str, item: Item) -> bool:
+        """Add an item; one of a tick already taken only shows that its port is alive again.
+
+        Returns
+        -------
+        bool
+            Whether nothing more can come for the earliest tick, as `complete`.
+        """
         if port not in self._awaited:
             self._awaited.add(port)
             self._find_first()
         items = self._ticks.get(stamp_ns)
         if items is None:
             if stamp_ns <= self._latest_taken_ns:
-                return
+                return self.complete
             items = self._ticks[stamp_ns] = {}
             self._find_first()
         if items is self._first and port not in items:
             self._lacking -= 1
         items[port] = item
+        # Run for every message: this is the usual answer.
+        if self._lacking and len(self._ticks) == 1:
+            return False
+        return self.complete
 
     @property
     def stamp_ns(self) -> int | None:
@@ -122,4 +132,5 @@ class TickInbox(Generic[Item]):
 
     def _find_first(self) -> None:
         self._first = self._ticks[min(self._ticks)] if self._ticks else None
-        self._lacking = len(self._awaited - (self._first or {}).keys())
+        heard = self._first
+        self._lacking = len(self._awaited - heard.keys() if heard else self._awaited)

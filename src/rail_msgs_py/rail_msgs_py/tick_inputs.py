@@ -86,12 +86,12 @@ class TickInputs:
         """
         port = topic.name(**parts)
         self._inbox.open(port)
-        inbox, put, advance, begin = self._inbox, self._inbox.put, self._advance, self._begin_tick
+        put, advance, begin = self._inbox.put, self._advance, self._begin_tick
 
         def receive(stamp_ns: int, item: Any) -> None:
-            put(stamp_ns, port, item)
+            complete = put(stamp_ns, port, item)
             begin()
-            if inbox.complete:
+            if complete:
                 advance()
 
         self._node.blocks_in(topic, decode, receive, **parts)
@@ -129,12 +129,11 @@ class TickInputs:
         """
         port = topic.name(**parts)
         self._open(port, owner or topic.owner(**parts), delay_ns)
-        inbox, put, advance = self._inbox, self._inbox.put, self._advance
+        put, advance = self._inbox.put, self._advance
 
         # Run for every message: whatever can be looked up before is.
         def receive(stamp_ns: int, item: Any) -> None:
-            put(stamp_ns + delay_ns, port, item)
-            if inbox.complete:
+            if put(stamp_ns + delay_ns, port, item):
                 advance()
 
         self._node.blocks_in(topic, decode, receive, **parts)
@@ -152,8 +151,8 @@ class TickInputs:
         self._open(port, owner, delay_ns)
 
         def put(stamp_ns: int, item: Any) -> None:
-            self._inbox.put(stamp_ns + delay_ns, port, item)
-            self._advance()
+            if self._inbox.put(stamp_ns + delay_ns, port, item):
+                self._advance()
 
         return put
 

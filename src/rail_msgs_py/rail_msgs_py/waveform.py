@@ -17,7 +17,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -232,8 +232,7 @@ class BlockReader:
         return self._last.stamp_ns, self._last
 
 
-@dataclass(frozen=True, eq=False)
-class RepeatedWaveform:
+class RepeatedWaveform(NamedTuple):
     """A block that is sent again: nothing but its stamp is new.
 
     Parameters
@@ -268,7 +267,10 @@ class RepeatedBlock:
         self._first = block
         self._before = raw[: _PREFIX.size]
         self._after = raw[_PREFIX.size + 8 :]
+        self._last = RepeatedWaveform(block.stamp_ns, block, self._before, self._after)
 
     def at(self, stamp_ns: int) -> RepeatedWaveform:
         """Block of the tick at ``stamp_ns``."""
-        return RepeatedWaveform(stamp_ns, self._first, self._before, self._after)
+        if self._last.stamp_ns != stamp_ns:
+            self._last = RepeatedWaveform(stamp_ns, self._first, self._before, self._after)
+        return self._last

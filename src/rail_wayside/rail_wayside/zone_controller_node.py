@@ -14,17 +14,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from operator import attrgetter
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rail_msgs_py.decoders import stamped
+from rail_msgs_py.delivery import ViewDecoder
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.quantities import GIVE_UP
-from rail_msgs_py.ranging.range_reading import range_from_cdr
+from rail_msgs_py.ranging.range_reading import RangeView, range_from_cdr
 from rail_msgs_py.table import TableWriter
 from rail_msgs_py.tick_node import TickNode
 from rail_msgs_py.topics.ranging import POSITION, RANGE
@@ -117,7 +118,7 @@ class ZoneControllerNode(
         self._writers: dict[tuple[str, str], PositionWriter] = {}
         # In the order of their names, so that sums over them are repeatable.
         self._zone_ports = {
-            name: self.inputs.port(RANGE, _reading, site=zone.site, zone=name)
+            name: self.inputs.port(RANGE, _READING, site=zone.site, zone=name)
             for name, zone in sorted(zone_map.zones.items())
         }
         self._open_issuer()
@@ -230,6 +231,14 @@ def _reports(stamp_ns: int, accepted: Sequence[AcceptedReport]) -> bytes:
 def _reading(raw: bytes) -> tuple[int, ZoneReading]:
     stamp_ns, range_m, variance_m2 = range_from_cdr(raw)
     return stamp_ns, NO_READING if range_m == math.inf else ZoneReading(range_m, variance_m2)
+
+
+def _reading_of_view(view: RangeView) -> tuple[int, ZoneReading]:
+    stamp_ns, range_m, variance_m2, _ = view
+    return stamp_ns, NO_READING if range_m == math.inf else ZoneReading(range_m, variance_m2)
+
+
+_READING: Final = ViewDecoder(_reading, _reading_of_view)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import struct
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Range
@@ -100,13 +100,35 @@ def range_from_cdr(raw: bytes) -> tuple[int, float, float]:
     return clock_from_cdr(raw), range_m, variance_m2
 
 
+class RangeView(NamedTuple):
+    """A reading of one antenna as it is sent, not serialised yet.
+
+    The message has single precision, so this has as well.
+    """
+
+    stamp_ns: int
+    range_m: float
+    variance_m2: float
+    writer: RangeWriter
+
+    def to_cdr(self) -> bytes:
+        """Serialised form."""
+        return self.writer.write(self.stamp_ns, self.range_m, self.variance_m2)
+
+
 class RangeWriter:
-    """Serialises the readings of one antenna: only stamp and values change."""
+    """Makes the readings of one antenna: only stamp and values change."""
 
     def __init__(self, zone: str, min_range_m: float, max_range_m: float) -> None:
         blank = RangeReading(0, zone, 0.0, 0.0, min_range_m, max_range_m)
         raw = serialize_message(blank.to_msg())
         self._head, self._middle = raw[:4], raw[12 : len(raw) - 8]
+
+    def view(self, stamp_ns: int, range_m: float, variance_m2: float) -> RangeView:
+        """Return a reading that is serialised when somebody needs it so."""
+        if not range_m == variance_m2 == math.inf:
+            range_m, variance_m2 = _VALUES.unpack(_VALUES.pack(range_m, variance_m2))
+        return RangeView(stamp_ns, range_m, variance_m2, self)
 
     def write(self, stamp_ns: int, range_m: float, variance_m2: float) -> bytes:
         """Serialised reading."""

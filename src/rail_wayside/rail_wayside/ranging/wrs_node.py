@@ -123,7 +123,7 @@ class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
         reading = NO_SIGNAL
         if received is not None and self.switched_on:
             reading = self._station.read(received[0])
-        antenna.publish(antenna.writer.write(stamp_ns, reading.range_m, reading.variance_m2))
+        antenna.publish(antenna.writer.view(stamp_ns, reading.range_m, reading.variance_m2))
         if reading.disturbance != antenna.disturbance:
             antenna.disturbance = reading.disturbance
             self._report_disturbance(zone, antenna, stamp_ns)

@@ -117,7 +117,7 @@ def test_what_comes_from_outside_does_not_wait_a_turn_for_each_message_before_it
 ) -> None:
     monkeypatch.setattr("rail_msgs_py.delivery._TURN_S", 0.0)
     got: list[bytes] = []
-    delivery.line("/t").writers += 1
+    delivery.line("/t").writers.append("sender")
     delivery.read("/t", reader("x", got.append), never)
     executor = Tasks()
     delivery.settle(executor)
@@ -141,19 +141,40 @@ def test_only_what_nobody_here_sends_is_subscribed_to(delivery: LocalDelivery) -
     for name in ("/here", "/outside"):
         one = reader("x", lambda _: None)
         delivery.read(name, one, lambda n=name: subscribed.append(n))
-    delivery.line("/here").writers += 1
+    delivery.line("/here").writers.append("sender")
     delivery.settle(Tasks())
     assert subscribed == ["/outside"]
 
 
 def test_who_comes_after_the_others_is_subscribed_at_once(delivery: LocalDelivery) -> None:
     subscribed: list[str] = []
-    delivery.line("/here").writers += 1
+    delivery.line("/here").writers.append("sender")
     delivery.settle(Tasks())
     for name in ("/here", "/outside"):
         one = reader("x", lambda _: None)
         delivery.read(name, one, lambda n=name: subscribed.append(n))
     assert subscribed == ["/outside"]
+
+
+def test_once_the_last_sender_here_is_taken_out_its_readers_hear_the_outside(
+    delivery: LocalDelivery,
+) -> None:
+    subscribed: list[str] = []
+    line = delivery.line("/t")
+    line.writers += ["first", "second"]
+    for name in ("reader", "gone"):
+        one = reader(name, lambda _: None)
+        delivery.read("/t", one, lambda n=name: subscribed.append(n))
+    executor = Tasks()
+    delivery.settle(executor)
+    for node in ("gone", "second", "first", "first"):
+        assert not subscribed
+        delivery.remove(node)
+    # Not in the midst of what the executor is about.
+    assert not subscribed
+    for task in executor.waiting:
+        task()
+    assert subscribed == ["reader"]
 
 
 def test_a_node_that_is_taken_out_gets_nothing_any_longer(delivery: LocalDelivery) -> None:
@@ -169,7 +190,7 @@ def test_a_node_that_is_taken_out_gets_nothing_any_longer(delivery: LocalDeliver
 
 def test_endless_work_is_done_in_turns(delivery: LocalDelivery) -> None:
     tasks = Tasks()
-    delivery.line("/t").writers += 1
+    delivery.line("/t").writers.append("sender")
     delivery.settle(tasks)
     seen = 0
 

@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 Item = TypeVar("Item")
@@ -97,10 +98,20 @@ class LocalReader:
 
 @dataclass(eq=False)
 class Line:
-    """One topic within a process."""
+    """One topic within a process: the nodes that send on it, and who reads it."""
 
-    writers: int = 0
+    writers: list[Any] = field(default_factory=list)
     readers: list[LocalReader] = field(default_factory=list)
+    #: Subscriptions to the outside that nobody has needed yet, and whose they would be.
+    subscriptions: list[tuple[Any, Callable[[], None]]] = field(default_factory=list)
+
+    def hear_outside(self) -> None:
+        """Subscribe outside, if nobody here sends."""
+        if self.writers:
+            return
+        for _, subscribe in self.subscriptions:
+            subscribe()
+        self.subscriptions.clear()
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,12 +185,8 @@ class LocalDelivery:
         """Add a reader; ``subscribe`` connects it to the outside if nobody here sends to it."""
         line = self.line(name)
         line.readers.append(reader)
-
-        def subscribe_if_needed() -> None:
-            if not line.writers:
-                subscribe()
-
-        self.when_settled(subscribe_if_needed)
+        line.subscriptions.append((reader.node, subscribe))
+        self.when_settled(line.hear_outside)
         return line
 
     def when_settled(self, callback: Callable[[], None]) -> None:
@@ -228,14 +235,27 @@ class LocalDelivery:
             put((reader.take_raw, raw, reader))
 
     def remove(self, node: Any) -> None:
-        """Hand nothing any longer to a node."""
+        """Hand nothing any longer to a node; what it sent may come from outside from now on.
+
+        The executor may be about to forget the node: subscriptions in its place come after that.
+        """
         for ear in self._ears.values():
-            ear.remove(node)
+            self._later(partial(ear.remove, node))
         for line in self._lines.values():
             line.readers = [reader for reader in line.readers if reader.node is not node]
+            line.subscriptions = [each for each in line.subscriptions if each[0] is not node]
+            if node in line.writers:
+                line.writers = [writer for writer in line.writers if writer is not node]
+                self._later(line.hear_outside)
         waiting = [entry for entry in self._queue if entry[2].node is not node]
         self._queue.clear()
         self._queue.extend(waiting)
+
+    def _later(self, task: Callable[[], None]) -> None:
+        if self._executor is None:
+            task()
+        else:
+            self._executor.create_task(task)
 
     def run(self) -> None:
         """Hand over what waits, and what comes of it; long work is done in turns.

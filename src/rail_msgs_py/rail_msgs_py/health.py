@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
 from rail_msgs_py.topics.tick import DIAGNOSTICS
 
@@ -85,6 +85,12 @@ class HealthMixin(RosNode):  # type: ignore[misc]
 
     def _tell_health(self, stamp_ns: int, without_stamp: bytes) -> None:
         self._publish_health(clock_to_cdr(stamp_ns) + without_stamp)
+
+
+def node_of_health(raw: bytes) -> str:
+    """Full name of the node that a serialised message of ``/diagnostics`` is about."""
+    message = deserialize_message(raw, DiagnosticArray)
+    return str(message.status[0].hardware_id) if message.status else ""
 
 
 def _without_stamp(statuses: list[DiagnosticStatus]) -> bytes:

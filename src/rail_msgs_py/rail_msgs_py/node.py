@@ -29,6 +29,8 @@ from .table import TableWriter
 
 #: Node that reads the run for its report.
 REPORT_NAME = "report"
+#: Wall time between two looks for senders in other processes.
+_LOOK_OUTSIDE_S = 1.0
 #: Which services a node offers beside its topics: all, none, or the lifecycle's alone.
 Services = bool | Literal["switches"]
 
@@ -70,7 +72,7 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         return getattr(self.context, "delivery", None)
 
     def _delivery_of(self, topic: Topic) -> LocalDelivery | None:
-        """Delivery of a topic that only one node sends."""
+        """Delivery to the readers of a topic that only one node sends."""
         return None if topic.shared else self._delivery
 
     def name_of(self, topic: Topic, **parts: object) -> str:
@@ -94,7 +96,7 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         if publisher.topic_name in getattr(self.context, "report_reads", ()):
             self._await_report(publisher)
         tap = getattr(self.context, "tap", None)
-        made.append(CorridorPublisher(topic, publisher, tap, self._delivery_of(topic)))
+        made.append(CorridorPublisher(self, topic, publisher, tap, self._delivery))
         return made[0]
 
     def _await_report(self, publisher: Any) -> None:
@@ -205,8 +207,48 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         reader = LocalReader(self, self._failed_callback, take_raw, take_view)
         line = delivery.read(name, reader, subscribe)
         self.await_connection(
-            lambda: line.writers > 0 or self.count_publishers(name) > 0, name, NO_SENDER
+            lambda: bool(line.writers) or self.count_publishers(name) > 0, name, NO_SENDER
         )
+
+    def here_in(
+        self,
+        topic: Topic,
+        callback: Callable[[bytes], None],
+        sender: Callable[[bytes], str],
+        **parts: object,
+    ) -> None:
+        """Subscribe to a topic that, as far as is known, only nodes of this process send on.
+
+        Once there are others, within a second, theirs is heard as well.
+
+        Parameters
+        ----------
+        topic, callback, **parts
+            As of `stream_in`.
+        sender : callable
+            Full name of the node that sent a message, not heard from outside if it is here.
+        """
+        delivery = self._delivery
+        if delivery is None:
+            self.stream_in(topic, callback, **parts)
+            return
+        asked = self.name_of(topic, **parts)
+        name = self.resolve_topic_name(asked)
+        reader = LocalReader(self, self._failed_callback, callback)
+        line = delivery.read(name, reader, lambda: None)
+        outside: list[Any] = []
+
+        def take(raw: bytes) -> None:
+            if sender(raw) not in {node.get_fully_qualified_name() for node in line.writers}:
+                callback(raw)
+
+        def look() -> None:
+            if not outside and self.count_publishers(name) > len(line.writers):
+                receive = self.guarded(take)
+                made = self.create_subscription(topic.type, asked, receive, topic.qos, raw=True)
+                outside.append(made)
+
+        self.look_every(_LOOK_OUTSIDE_S, look)
 
     def listen(self, topic: Topic, callback: Callable[[Any], None], **parts: object) -> None:
         """Subscribe to messages of a topic that nothing waits for."""

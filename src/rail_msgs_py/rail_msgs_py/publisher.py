@@ -21,6 +21,8 @@ class CorridorPublisher:
 
     Parameters
     ----------
+    node : node
+        The sender.
     topic : Topic
     publisher : rclpy Publisher
     tap : Tap, optional
@@ -29,14 +31,19 @@ class CorridorPublisher:
     """
 
     def __init__(
-        self, topic: Topic, publisher: Any, tap: Tap | None, delivery: LocalDelivery | None
+        self,
+        node: Any,
+        topic: Topic,
+        publisher: Any,
+        tap: Tap | None,
+        delivery: LocalDelivery | None,
     ) -> None:
         self._publisher = publisher
         self._count = publisher.handle.get_subscription_count
         sink = None if tap is None else tap(topic, publisher.topic_name)
         self._line = None if delivery is None else delivery.line(publisher.topic_name)
         if self._line is not None:
-            self._line.writers += 1
+            self._line.writers.append(node)
         #: Sends a message, or its serialised form.
         self.send: Send = self._sender(sink, delivery)
         # Whether the middleware has to carry it: until more is known it has.

@@ -13,10 +13,11 @@ from rail_corridor.equipment.map_scene import MapScene
 from rail_corridor.plan.plan import REPORT, Plan
 from rail_corridor.run_data import RunData
 from rail_msgs_py.failures import failure
+from rail_msgs_py.health import node_of_health
 from rail_msgs_py.node import CorridorNode
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
-from rail_msgs_py.topics.tick import FAILED, OBSERVED
+from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, OBSERVED
 from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.world import STATE, TRAIN_MARKERS
 from rail_signals.arrays import FloatArray
@@ -37,6 +38,8 @@ class Observer(CorridorNode):
         Called about ten times a second of wall time.
     record : bool
         False where the report is made on another host.
+    alone : bool
+        Whether all nodes of the corridor are in this process.
     """
 
     def __init__(
@@ -46,6 +49,7 @@ class Observer(CorridorNode):
         *,
         context: Any = None,
         record: bool = True,
+        alone: bool = False,
     ) -> None:
         super().__init__(NAME, "/", context=context, services=False)
         self._tick_ns = plan.world.tick_ns
@@ -59,6 +63,8 @@ class Observer(CorridorNode):
         for reader in self.intake.readers:
             if not reader.raw:
                 self.listen(reader.topic, reader.take, **reader.parts)
+            elif record and alone and reader.topic is DIAGNOSTICS:
+                self.here_in(reader.topic, reader.take, node_of_health)
             elif record:
                 take = self._noting(reader.take) if reader.topic is STATE else reader.take
                 self.stream_in(reader.topic, take, **reader.parts)

@@ -209,6 +209,7 @@ class _LaunchedRun:
             self._on_progress,
             context=context,
             record=self._options.only != "onboard",
+            alone=bool(self._here) and not (self._options.only or self._options.external),
         )
         here = make_nodes(
             self._here,

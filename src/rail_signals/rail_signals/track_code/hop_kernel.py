@@ -19,9 +19,10 @@ from rail_signals.single_precision import angle
 SingleArray: TypeAlias = NDArray[np.float32]
 
 #: Numbers of taps are a multiple of these: of the filter in the band, and of those that decimate.
-BAND_STEP, WINDOW_STEP = 8, 32
-_1, _2, _3, _4, _5, _6, _7 = (np.uint64(n) for n in range(1, 8))
+BAND_STEP, WINDOW_STEP = 4, 32
+_1, _2, _3 = np.uint64(1), np.uint64(2), np.uint64(3)
 _ZERO = np.float32(0.0)
+_BLOCK = 8
 
 
 @compiled
@@ -85,7 +86,10 @@ def demodulate_hops(
     band_real, band_imag = in_band[0], in_band[1]
     front_re, front_im, band_re, band_im = front[0], front[1], band[0], band[1]
     for hop in range(len(frames)):
-        faulty[hop] = _is_faulty(bits, hop, marks)
+        if hop % _BLOCK == 0:
+            # One long reading brings some hops into the cache sooner than many short ones.
+            for ahead in range(hop, min(hop + _BLOCK, len(frames))):
+                faulty[ahead] = _is_faulty(bits, ahead, marks)
         _take(frames, hop, faulty[hop], new_samples)
         _decimate(samples, front_re, front_im, decimation, new_real, new_imag)
         power = _filter_band(real, imag, band_re, band_im, band_real, band_imag)
@@ -188,7 +192,7 @@ def _filter_band(
     return _sum_of_squares(out_real, out_imag)
 
 
-@compiled
+@compiled_sums
 def _add_taps(
     real: SingleArray,
     imag: SingleArray,
@@ -198,28 +202,19 @@ def _add_taps(
     out_real: SingleArray,
     out_imag: SingleArray,
 ) -> None:
-    """Add the share of `BAND_STEP` taps to all outputs but the first."""
+    """Add the share of `BAND_STEP` taps to all outputs but the first.
+
+    With so many, taps and samples stay in the processor's registers.
+    """
     i, start = first, np.uint64(first)
     a, b, c, d = tap_re[i], tap_re[i + 1], tap_re[i + 2], tap_re[i + 3]
-    e, f, g, h = tap_re[i + 4], tap_re[i + 5], tap_re[i + 6], tap_re[i + 7]
     p, q, r, s = tap_im[i], tap_im[i + 1], tap_im[i + 2], tap_im[i + 3]
-    t, u, v, w = tap_im[i + 4], tap_im[i + 5], tap_im[i + 6], tap_im[i + 7]
     for k in range(len(out_real) - 1):
         j = start + np.uint64(k)
-        x0, y0 = real[j], imag[j]
-        x1, y1 = real[j + _1], imag[j + _1]
-        x2, y2 = real[j + _2], imag[j + _2]
-        x3, y3 = real[j + _3], imag[j + _3]
-        x4, y4 = real[j + _4], imag[j + _4]
-        x5, y5 = real[j + _5], imag[j + _5]
-        x6, y6 = real[j + _6], imag[j + _6]
-        x7, y7 = real[j + _7], imag[j + _7]
-        out_real[k + 1] += (
-            ((a * x0 - p * y0) + (b * x1 - q * y1)) + ((c * x2 - r * y2) + (d * x3 - s * y3))
-        ) + (((e * x4 - t * y4) + (f * x5 - u * y5)) + ((g * x6 - v * y6) + (h * x7 - w * y7)))
-        out_imag[k + 1] += (
-            ((a * y0 + p * x0) + (b * y1 + q * x1)) + ((c * y2 + r * x2) + (d * y3 + s * x3))
-        ) + (((e * y4 + t * x4) + (f * y5 + u * x5)) + ((g * y6 + v * x6) + (h * y7 + w * x7)))
+        x0, x1, x2, x3 = real[j], real[j + _1], real[j + _2], real[j + _3]
+        y0, y1, y2, y3 = imag[j], imag[j + _1], imag[j + _2], imag[j + _3]
+        out_real[k + 1] += (a * x0 + b * x1 + c * x2 + d * x3) - (p * y0 + q * y1 + r * y2 + s * y3)
+        out_imag[k + 1] += (a * y0 + b * y1 + c * y2 + d * y3) + (p * x0 + q * x1 + r * x2 + s * x3)
 
 
 @compiled_sums

@@ -75,15 +75,14 @@ def measure_slots(
             change_hz = _left_over(stream, newest, parts, hop - 1, next_wave, left)
             is_changed[hop] = change_hz > max(limits[5] * residual_hz[hop - 1], limits[6])
         clear = _residual_energy(found, row, 2 * tones) <= limits[4]
+        _judge(found, row, deviations, limits, levels, bits, hop)
         for i in range(tones):
-            re, im = found[row, i], found[row, tones + i]
-            level = math.sqrt(re * re + im * im) / deviations[i]
-            is_present = level > limits[0]
-            levels[hop, i], bits[hop, i] = level, is_present
-            parts[hop, i] = re if is_present else _ZERO
-            parts[hop, tones + i] = im if is_present else _ZERO
-            clear = clear and (level <= limits[1] or (limits[2] <= level <= limits[3]))
+            level = levels[hop, i]
+            clear &= (level <= limits[1]) | ((limits[2] <= level) & (level <= limits[3]))
         is_clear[hop] = clear
+        for i in range(tones):
+            parts[hop, i] = found[row, i] if bits[hop, i] else _ZERO
+            parts[hop, tones + i] = found[row, tones + i] if bits[hop, i] else _ZERO
         residual_hz[hop] = _left_over(stream, start, parts, hop, wave, left)
 
 
@@ -116,6 +115,25 @@ def _measure(
                     (e * matrix[n + 4, k] + f * matrix[n + 5, k])
                     + (g * matrix[n + 6, k] + h * matrix[n + 7, k])
                 )
+
+
+@compiled
+def _judge(
+    found: SingleArray,
+    row: int,
+    deviations: FloatArray,
+    limits: FloatArray,
+    levels: FloatArray,
+    bits: BoolArray,
+    hop: int,
+) -> None:
+    """Levels of a slot, and which tones are present."""
+    tones = len(deviations)
+    for i in range(tones):
+        re, im = found[row, i], found[row, tones + i]
+        levels[hop, i] = math.sqrt(re * re + im * im) / deviations[i]
+    for i in range(tones):
+        bits[hop, i] = levels[hop, i] > limits[0]
 
 
 @compiled

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -84,6 +86,18 @@ def test_decisions_do_not_depend_on_the_blocks() -> None:
     pieces = [d for block in np.split(wave, cuts) for d in receiver.feed(block)]
     assert receiver.feed(np.zeros(0)) == []
     assert_same(pieces, whole, level=0.0)
+
+
+def test_a_level_in_no_window_is_no_word() -> None:
+    profile = load_profile("tones18")
+    middle = (profile.absent_max + profile.present_min) / 2 + 0.02
+    weak = replace(profile, deviations_hz=tuple(middle * d for d in profile.deviations_hz))
+    wave = FmTransmitter(weak, 2000.0, 6400.0).block(np.arange(18) == 4, 19200)
+    fast = TrackCodeReceiver(profile, 2000.0, 6400.0).feed(wave)
+    assert_same(fast, ReferenceTrackCodeReceiver(profile, 2000.0, 6400.0).feed(wave))
+    assert fast[-1].bits.tolist() == (np.arange(18) == 4).tolist()
+    assert not fast[-1].valid
+    assert fast[-1].reason.endswith("is in no window")
 
 
 def test_hops_of_other_lengths() -> None:

@@ -349,6 +349,19 @@ MUTANTS: list[Mutant] = [
         ("check bits are not looked at", "word >> degree) != check:", "word >> degree) < 0:"),
     ),
     *_group(
+        "rail_signals/rail_signals/track_code/hop_kernel.py",
+        "rail_signals/track_code/test_kernels.py",
+        ("a clipped sample too many passes", "count <= marks[2]", "count <= marks[2] + 1"),
+        ("loud samples pass", "0 < peak <= marks[1]", "0 < peak"),
+    ),
+    *_group(
+        "rail_signals/rail_signals/track_code/slot_kernel.py",
+        "rail_signals/track_code/test_receiver.py ::test_every_decision_is_that_of_the_chain"
+        " ::test_a_level_in_no_window_is_no_word",
+        ("no change is noticed", "is_changed[hop] = change_hz >", "is_changed[hop] = 0.0 >"),
+        ("a level in no window passes", "clear &= (level <= limits[1]) |", "clear &= True |"),
+    ),
+    *_group(
         f"{WAYSIDE}/track_code/code_logic.py",
         "rail_wayside/track_code/test_code_logic.py ::test_unknown_is_occupied"
         " ::test_the_last_block_before_the_overlap_ends_at_a_stand",

@@ -9,9 +9,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 
-from rail_signals.compiled import Kernel, cache_folder, preload_kernels
+from rail_signals.compiled import Kernel, cache_folder, compiled_sums, preload_kernels
 
 INNER = """
 from rail_signals.compiled import compiled
@@ -116,3 +117,20 @@ def test_where_the_sources_cannot_be_written_the_user_has_the_folder(
     monkeypatch.setattr("os.access", lambda path, mode: False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache_folder(tmp_path / "made") == tmp_path / "rail_corridor"
+
+
+def test_a_sum_is_the_same_wherever_its_terms_lie() -> None:
+    @compiled_sums
+    def total(values: Any, first: Any, count: Any) -> Any:
+        found = np.float32(0.0)
+        for i in range(count):
+            found += values[first + i]
+        return found
+
+    values = np.random.default_rng(6).normal(size=101).astype(np.float32)
+    wanted = total(values, 0, 101)
+    assert wanted == pytest.approx(np.sum(values.astype(np.float64)), abs=1e-4)
+    for shift in range(20):
+        many = np.full(140, 1e9, dtype=np.float32)
+        many[shift : shift + 101] = values
+        assert total(many, shift, 101) == wanted

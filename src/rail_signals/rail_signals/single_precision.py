@@ -29,6 +29,15 @@ _C4, _C6, _C8 = (
 )
 # Added and taken away again, it leaves the nearest whole number, to the even one at a half.
 _WHOLE = 1.5 * 2.0**52
+# The same: atanf below the tangent of an eighth of pi.
+_A3, _A5, _A7, _A9 = (
+    np.float32(-3.33329491539e-1),
+    np.float32(1.99777106478e-1),
+    np.float32(-1.38776856032e-1),
+    np.float32(8.05374449538e-2),
+)
+_ZERO, _PI, _EIGHTH_RAD = np.float32(0.0), np.float32(math.pi), np.float32(0.25 * math.pi)
+_TANGENT = np.float32(math.tan(math.pi / 8))
 
 
 @compiled
@@ -70,3 +79,22 @@ def phasor_of_turns(turns: Any) -> Any:
     quarters = 4.0 * (turns - nearest_whole(turns))
     whole = nearest_whole(quarters)
     return phasor(np.int32(whole), np.float32(quarters - whole))
+
+
+@compiled
+def angle(real: Any, imag: Any) -> Any:
+    """Angle [rad] of a complex number of two float32, from -pi to pi; 0 of zero."""
+    wide, high = abs(real), abs(imag)
+    large = high if high > wide else wide
+    small = wide if high > wide else high
+    # Above an eighth of pi it is counted from a quarter.
+    is_large = small > _TANGENT * large
+    over = small - large if is_large else small
+    under = small + large if is_large else large
+    x = over / (under if under > _ZERO else _ONE)
+    z = x * x
+    found = x + x * z * (_A3 + z * (_A5 + z * (_A7 + z * _A9)))
+    found = found + (_EIGHTH_RAD if is_large else _ZERO)
+    found = _QUARTER_RAD - found if high > wide else found
+    found = _PI - found if real < _ZERO else found
+    return -found if imag < _ZERO else found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -108,17 +107,15 @@ def test_silence_and_rubbish_are_not_detected(tones: int) -> None:
 def test_leading_axes(shape: tuple[int, ...]) -> None:
     lag = np.full((*shape, 2), 1.5)
     found = RECEIVERS[2].estimate(modulate(TWO, lag))
-    for field in fields(ToneEstimate):
-        value = getattr(found, field.name)
-        per_tone = field.name in ("phase_lag_rad", "variance_rad2")
+    for name, value in found._asdict().items():
+        per_tone = name in ("phase_lag_rad", "variance_rad2")
         assert value.shape == (*shape, 2) if per_tone else value.shape == shape
     np.testing.assert_allclose(found.phase_lag_rad, lag, atol=1e-4)
 
 
 def same_bits(left: ToneEstimate, right: ToneEstimate, i: int, j: int) -> None:
-    for field in fields(ToneEstimate):
-        a, b = getattr(left, field.name)[i], getattr(right, field.name)[j]
-        assert np.asarray(a).tobytes() == np.asarray(b).tobytes(), field.name
+    for name, ours, theirs in zip(ToneEstimate._fields, left, right, strict=True):
+        assert ours[i].tobytes() == theirs[j].tobytes(), name
 
 
 @pytest.mark.parametrize("signal", [ONE, TWO, RangingSignal(samples=3968)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,12 +11,8 @@ from rail_signals.track_code.block_demodulator import BlockDemodulator
 from rail_signals.track_code.decision import Decision
 from rail_signals.track_code.demodulator import Demodulator, DemodulatorChain
 from rail_signals.track_code.profile import TrackCodeProfile, load_profile
-from rail_signals.track_code.receiver import TrackCodeReceiver, _input_faults
-from rail_signals.track_code.reference_receiver import (
-    LOUDEST,
-    ReferenceTrackCodeReceiver,
-    input_fault,
-)
+from rail_signals.track_code.receiver import TrackCodeReceiver
+from rail_signals.track_code.reference_receiver import ReferenceTrackCodeReceiver
 from rail_signals.track_code.signal import FmTransmitter
 from rail_signals.track_code.word import encode
 
@@ -87,7 +85,19 @@ def test_decisions_do_not_depend_on_the_blocks() -> None:
     cuts = np.sort(rng.integers(0, wave.size, 60))
     pieces = [d for block in np.split(wave, cuts) for d in receiver.feed(block)]
     assert receiver.feed(np.zeros(0)) == []
-    assert_same(pieces, whole, level=1e-4)
+    assert_same(pieces, whole, level=0.0)
+
+
+def test_a_level_in_no_window_is_no_word() -> None:
+    profile = load_profile("tones18")
+    middle = (profile.absent_max + profile.present_min) / 2 + 0.02
+    weak = replace(profile, deviations_hz=tuple(middle * d for d in profile.deviations_hz))
+    wave = FmTransmitter(weak, 2000.0, 6400.0).block(np.arange(18) == 4, 19200)
+    fast = TrackCodeReceiver(profile, 2000.0, 6400.0).feed(wave)
+    assert_same(fast, ReferenceTrackCodeReceiver(profile, 2000.0, 6400.0).feed(wave))
+    assert fast[-1].bits.tolist() == (np.arange(18) == 4).tolist()
+    assert not fast[-1].valid
+    assert fast[-1].reason.endswith("is in no window")
 
 
 def test_hops_of_other_lengths() -> None:
@@ -141,14 +151,14 @@ def test_the_demodulated_wave_is_that_of_the_chain(rate_hz: float) -> None:
     chain = DemodulatorChain(TONES27, 1700.0, rate_hz)
     hops = round(rate_hz / 8)
     wave = wave_of(rng, TONES27, rate_hz, seconds=3.0, noise=0.05).reshape(-1, hops)
-    fast = BlockDemodulator(chain, 8)
-    found, amplitude = fast.demodulate(fast.decimate(wave.astype(np.float32)), len(wave))
+    found, amplitude, _ = BlockDemodulator(chain, 8).demodulate(wave.astype(np.float32))
     slow = Demodulator(chain)
     frames = [slow.frame(frame) for frame in wave]
-    settled = slice(8, None)
+    # The step out of silence has any angle, and the DC rejecter takes two seconds to forget it.
+    settled = slice(16, None)
     wanted = np.array([f[0] for f in frames])[settled]
-    # 60 dB below the wave, whose deviation is some 15 Hz in root mean square.
-    assert np.sqrt(np.mean((found[settled] - wanted) ** 2)) < 0.03
+    # 64 dB below the wave, whose deviation is some 15 Hz in root mean square.
+    assert np.sqrt(np.mean((found[settled] - wanted) ** 2)) < 0.01
     assert amplitude[settled] == pytest.approx([f[1] for f in frames][settled], rel=5e-3)
 
 
@@ -156,22 +166,3 @@ def test_the_demodulated_wave_is_that_of_the_chain(rate_hz: float) -> None:
 def test_what_is_no_wave_is_refused(samples: np.ndarray) -> None:
     with pytest.raises(ValueError, match="real floats in one dimension"):
         TrackCodeReceiver(TONES27, 1700.0, 16_000.0).feed(samples)
-
-
-@pytest.mark.parametrize("kind", [np.float16, np.float32, np.float64])
-def test_hops_at_fault_are_those_of_the_plain_check(kind: type[np.floating]) -> None:
-    frames = np.random.default_rng(31).normal(size=(9, 400)).astype(kind)
-    frames[1, 7] = np.nan
-    frames[2, -1] = -np.inf
-    frames[3] = 0
-    frames[4] = np.clip(frames[4], -0.5, 0.5)
-    frames[5] = np.minimum(frames[5], 0.5)
-    frames[6] *= -1
-    if kind is not np.float16:
-        frames[7] *= 10 * LOUDEST
-    expected = [bool(input_fault(frame.astype(np.float64))) for frame in frames]
-    assert expected[:6] == [False, True, True, True, True, False]
-    assert _input_faults(frames).tolist() == expected
-    assert _input_faults(frames[:, ::2]).tolist() == [
-        bool(input_fault(frame.astype(np.float64))) for frame in frames[:, ::2]
-    ]

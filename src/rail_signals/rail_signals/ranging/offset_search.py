@@ -28,6 +28,7 @@ MAX_TAPERS = 12
 """Largest number of tapers; with more the sums take longer than they save."""
 
 _TAPERS_FROM = 64
+_VECTORS = 32
 _SEGMENT_CYCLES = 0.25
 
 
@@ -89,7 +90,7 @@ class OffsetSearch:
         self.grid = np.stack([turn.real, turn.imag])
         """Turns of segments, or of weighted sums, at the offsets from zero up: [2, grid, rows]."""
         self.halves = _halves(self.tapers, periods)
-        """Twice the weights from the middle of the burst up [tapers, half]; [0, 0] if none."""
+        """Twice the weights from the middle of the burst up, then zeros; [0, 0] if none."""
         self.numbers = np.array(
             [
                 step_hz,
@@ -107,18 +108,17 @@ class OffsetSearch:
         one = basis.reshape(2 * period, -1)
         self.strong = np.ascontiguousarray(one.T)
         """From a period to the components, real and then imaginary parts: [2 L, 2 period]."""
-        self.segment_basis = np.tile(one, (repeats, 1))
-        """From the periods of a segment to its components: [2 period repeats, 2 L]."""
 
 
 def _halves(tapers: FloatArray | None, periods: int) -> FloatArray:
-    """Weights [tapers, half] from the middle up, twice, but for that of a period in it."""
+    """Weights from the middle up, twice, but for that of a period in it, then zeros."""
     if tapers is None:
         return np.zeros((0, 0))
     halves = 2.0 * tapers[:, periods // 2 :]
     if periods % 2:
         halves[:, 0] /= 2
-    return halves
+    # Sums of whole vectors are faster.
+    return np.pad(halves, ((0, 0), (0, -halves.shape[1] % _VECTORS)))
 
 
 def _segment_periods(periods: int, cycles_per_period: float) -> int:

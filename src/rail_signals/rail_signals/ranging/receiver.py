@@ -9,14 +9,15 @@ bound ``1 / (gamma N beta^2)`` tens of decibels lower.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rail_signals.arrays import BoolArray, FloatArray
+from rail_signals.arrays import FloatArray
 
-from .burst_kernel import estimate_bursts
+from .burst_kernel import SEARCH_NUMBERS, estimate_bursts
+from .burst_sums import burst_energies
 from .detector import detection_threshold
 from .fm_spectrum import fm_spectrum
 from .offset_search import OffsetSearch, RealArray
@@ -32,11 +33,9 @@ MAX_SNR_SINGLE = 1e6
 
 _STRONG_FRACTION = 0.92
 _CHUNK_BYTES = 3 << 18
-_FEW_SEGMENTS = 8
 
 
-@dataclass(frozen=True)
-class ToneEstimate:
+class ToneEstimate(NamedTuple):
     """What a receiver found in each burst. Leading axes are those of the bursts.
 
     Where nothing was detected, phases, offset and reduced chi-square are NaN, the variance is
@@ -129,29 +128,26 @@ class FmToneReceiver:
             false_alarm, len(strong.bins), samples, search_hz, signal.duration_s
         )
         fit = TonePhaseFit(signal, components, strong, fraction)
+        self._fields = 2 * len(signal.tones_hz) + 4
         self._tables = (
-            search.strong if search else np.zeros((1, 1)),
+            np.concatenate([search.strong, fit.basis] if search else [fit.basis]),
             search.grid if search else np.zeros((2, 1, 1)),
             search.halves if search else np.zeros((0, 0)),
-            search.numbers if search else np.zeros(6),
-            fit.basis,
             fit.orders,
             fit.weights,
             fit.pairs,
             fit.pair_weights,
         )
+        # Without a search the offset is zero: the sum of the periods is all that is needed.
         weights = search.tapers if search else np.ones((1, self._periods))
-        segments = search.grid.shape[2] if search else 1
-        has_products = weights is not None or segments > _FEW_SEGMENTS
+        numbers = search.numbers if search else np.zeros(SEARCH_NUMBERS)
         self._plans = {
             np.dtype(kind): _Plan(
-                has_products,
-                None if weights is None else weights.astype(kind),
-                np.ascontiguousarray(search.segment_basis, dtype=kind) if search else None,
-                fit.levels(ceiling),
-                (np.zeros(0, dtype=kind), np.zeros((0, 0, 0), dtype=kind)),
+                real,
+                None if weights is None else weights.astype(real),
+                np.concatenate([numbers, fit.numbers(ceiling)]),
             )
-            for kind, ceiling in _CEILINGS.items()
+            for kind, real, ceiling in _PRECISIONS
         }
 
     def estimate(self, bursts: ArrayLike) -> ToneEstimate:
@@ -171,26 +167,23 @@ class FmToneReceiver:
         ToneEstimate
         """
         x = np.asarray(bursts)
-        if x.dtype != np.complex64:
-            x = np.asarray(x, dtype=np.complex128)
-        samples = self.signal.samples
-        if x.ndim == 0 or x.shape[-1] != samples:
-            raise ValueError(f"bursts must have {samples} samples, got shape {x.shape}")
-        lead = x.shape[:-1]
-        real = np.float32 if x.dtype == np.complex64 else np.float64
-        parts = np.ascontiguousarray(x).reshape(-1, samples).view(real)
-        tones = len(self.signal.tones_hz)
-        table = np.empty((len(parts), 2 * tones + 4))
-        detected = np.empty(len(parts), dtype=np.bool_)
-        # In pieces that stay in the processor's cache.
-        step = max(1, _CHUNK_BYTES // (samples * x.itemsize))
-        if len(parts) <= step:
-            self._estimate_piece(parts, table, detected)
-        else:
-            for i in range(0, len(parts), step):
-                piece = slice(i, i + step)
-                self._estimate_piece(parts[piece], table[piece], detected[piece])
-        table = table.reshape(*lead, 2 * tones + 4)
+        plan = self._plans.get(x.dtype)
+        if plan is None:
+            x = x.astype(np.complex128)
+            plan = self._plans[x.dtype]
+        samples, shape = self.signal.samples, x.shape
+        if not shape or shape[-1] != samples:
+            raise ValueError(f"bursts must have {samples} samples, got shape {shape}")
+        lead = shape[:-1]
+        parts = np.ascontiguousarray(x).view(plan.real).reshape(-1, 2 * samples)
+        count, fields = len(parts), self._fields
+        table, detected = np.empty((count, fields)), np.empty(count, dtype=np.bool_)
+        energy, rows = _NOTHING, parts
+        if plan.weights is not None:
+            energy, rows = self._summed(parts, plan.weights)
+        estimate_bursts(energy, rows, *self._tables, plan.numbers, table, detected)
+        table = table.reshape(*lead, fields)
+        tones = (fields - 4) // 2
         return ToneEstimate(
             table[..., :tones],
             table[..., tones:-4],
@@ -201,38 +194,37 @@ class FmToneReceiver:
             detected.reshape(lead),
         )
 
-    def _estimate_piece(self, parts: RealArray, table: FloatArray, detected: BoolArray) -> None:
-        """Fill the fields of some bursts [batch, 2 samples] (`estimate_bursts`)."""
-        plan = self._plans[parts.dtype]
-        rows = parts.reshape(len(parts), self._periods, 2 * self._period)
-        energy, components = plan.nothing
-        if plan.has_products:
-            # Stacked, one of fixed shape for each burst, so that rounding does not depend on
-            # the batch. Too large or not finite is not detected.
-            with np.errstate(all="ignore"):
-                # The sums come first: what reads the bursts from far away hides it best.
-                if plan.weights is not None:
-                    rows = np.matmul(plan.weights, rows)
-                energy = np.vecdot(parts, parts)
-                if plan.basis is not None:
-                    segments = rows.reshape(len(parts), -1, len(plan.basis))
-                    components = np.matmul(segments, plan.basis)
-        estimate_bursts(energy, rows, components, *self._tables, plan.levels, table, detected)
+    def _summed(self, parts: RealArray, weights: RealArray) -> tuple[FloatArray, RealArray]:
+        """Energies [batch] and weighted sums of periods [batch, sums * 2 period] of bursts."""
+        count = len(parts)
+        periods = parts.reshape(count, self._periods, -1)
+        energy = np.empty(count)
+        sums = np.empty((count, len(weights), periods.shape[2]), dtype=parts.dtype)
+        # In pieces that stay in the processor's cache, where the energies bring them.
+        step = max(1, _CHUNK_BYTES // (parts.itemsize * parts.shape[1]))
+        with np.errstate(all="ignore"):  # too large or not finite is not detected
+            for i in range(0, count, step):
+                burst_energies(parts[i : i + step], energy[i : i + step])
+                # Stacked, one of fixed shape for each burst, so that rounding does not depend
+                # on the batch.
+                np.matmul(weights, periods[i : i + step], out=sums[i : i + step])
+        return energy, sums.reshape(count, -1)
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """What is done in the precision of the bursts before the compiled part.
+class _Plan(NamedTuple):
+    """What is done in the precision of the bursts, and with what.
 
-    With `has_products` energy, sums by `weights` and components by `basis` are matrix products;
-    without, the compiled part forms them: for few segments that takes less than the calls.
+    With `weights` the periods are summed by a matrix product before the compiled part; without,
+    that reads the burst itself.
     """
 
-    has_products: bool
+    real: type[np.floating]
     weights: RealArray | None
-    basis: RealArray | None
-    levels: FloatArray
-    nothing: tuple[RealArray, RealArray]
+    numbers: FloatArray
 
 
-_CEILINGS = {np.float32: MAX_SNR_SINGLE, np.float64: MAX_SNR}
+_NOTHING = np.zeros(0)
+_PRECISIONS = (
+    (np.complex64, np.float32, MAX_SNR_SINGLE),
+    (np.complex128, np.float64, MAX_SNR),
+)

@@ -10,8 +10,6 @@ from rail_signals.arrays import FloatArray
 from .fm_spectrum import FmSpectrum
 from .signal import RangingSignal
 
-_COLUMNS = 16
-
 
 class TonePhaseFit:
     """Tables of one Gauss-Newton step on complex amplitude and tone phases (`burst_kernel`).
@@ -36,11 +34,8 @@ class TonePhaseFit:
         samples, period = signal.samples, signal.period_samples
         periods = samples // period
         tones = components.orders.shape[1]
-        basis = components.real_basis(period) / periods
-        # Filled up with zeros to whole vectors.
-        spare = -basis.shape[1] % _COLUMNS
-        self.basis: FloatArray = np.pad(basis, ((0, 0), (0, spare)))
-        """From a folded period to its components: [2 period, columns]."""
+        self.basis: FloatArray = components.real_basis(period).T / periods
+        """From a folded period to its components: [2 components, 2 period]."""
         self.orders: NDArray[np.int64] = components.orders.astype(np.int64)
         """Orders [components, tones]."""
         information, amplitudes = components.information, components.amplitudes
@@ -55,7 +50,7 @@ class TonePhaseFit:
         self.pairs, self.pair_weights = _neighbours(components)
         """Tone, upper and lower component [pairs, 3], and the weights of their products."""
         noise_scale = 1 / (samples - period)
-        self._levels = [
+        self._scales = [
             noise_scale,
             noise_scale / periods,
             components.power,
@@ -66,9 +61,9 @@ class TonePhaseFit:
             *(information / components.power),
         ]
 
-    def levels(self, max_snr: float) -> FloatArray:
+    def numbers(self, max_snr: float) -> FloatArray:
         """Scales of the estimates under a ceiling of the carrier-to-noise ratio."""
-        return np.array([max_snr, *self._levels])
+        return np.array([max_snr, *self._scales])
 
 
 def _neighbours(components: FmSpectrum) -> tuple[NDArray[np.int64], FloatArray]:

@@ -1,10 +1,9 @@
-"""The demodulator's chain for long inputs, as matrix products.
+"""The demodulator's chain for long inputs.
 
 `rail_signals.track_code.demodulator` filters every input sample by an elliptic band-pass.
 Here that filter's response, phase included, is that of two short ones with complex taps:
 
-1. A low-pass about the carrier, evaluated at the discriminator's rate only: one product of
-   the input, cut into rows of 1/128 s, with a matrix of the taps.
+1. A low-pass about the carrier, evaluated at the discriminator's rate only.
 2. At that rate, what is missing to the elliptic band-pass and the analytic filter.
 
 So neither levels nor the times at which they settle differ. The discriminator works in
@@ -20,12 +19,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
 
 from .demodulator import STOP_HZ, DemodulatorChain
-from .filters import DEMODULATED_RATE_HZ, SectionFilter, dc_rejecter, response
+from .filters import DEMODULATED_RATE_HZ, dc_rejecter, response
+from .hop_kernel import BAND_STEP, WINDOW_STEP, SingleArray, demodulate_hops
+from .profile import SLOT_RATE_HZ
+from .reference_receiver import LOUDEST, MOST_AT_PEAK
 
-SingleArray: TypeAlias = NDArray[np.float32]
+RealArray: TypeAlias = NDArray[np.floating]
+
+_STORED_AS: dict[np.dtype[np.floating], type[np.signedinteger]] = {
+    np.dtype(np.float32): np.int32,
+    np.dtype(np.float64): np.int64,
+}
 
 # Of the first filter. Its ripple is made good by the second.
 _FRONT_DB = 55.0
@@ -35,64 +42,10 @@ _BAND_TAPS_S = 0.1
 _IMPULSE_REST = 1e-4
 
 
-class RowFilter:
-    """FIR filter, decimating or not, as one matrix product over rows of samples.
-
-    ``P = X A`` with the rows of X following each other in time. A column of P is what a row
-    adds to one output, its own or one of the rows after it, so that no sample is read twice.
-
-    Parameters
-    ----------
-    taps : complex or real [n]
-        Impulse response at the input rate; real ones are for real input.
-    decimation
-        Input samples per output; an output is of the time of the last of them.
-    outputs
-        Outputs per row.
-    real
-        Whether the input is real; else real and imaginary parts alternate.
-    """
-
-    def __init__(
-        self, taps: ComplexArray | FloatArray, decimation: int, outputs: int, real: bool
-    ) -> None:
-        inputs = outputs * decimation
-        span = outputs + math.ceil((taps.size - 1) / decimation)
-        index = (np.arange(span)[None, :] + 1) * decimation - 1 - np.arange(inputs)[:, None]
-        inside = (index >= 0) & (index < taps.size)
-        tap = np.where(inside, taps[np.clip(index, 0, taps.size - 1)], 0)
-        each = 2 if np.iscomplexobj(taps) else 1
-        parts = np.stack([tap.real, tap.imag][:each], axis=-1).reshape(inputs, each * span)
-        if not real:
-            turned = np.stack([-tap.imag, tap.real], axis=-1).reshape(inputs, 2 * span)
-            parts = np.stack([parts, turned], axis=1).reshape(2 * inputs, 2 * span)
-        self._matrix = np.ascontiguousarray(parts, dtype=np.float32)
-        self._width = each * outputs
-        self._spill = math.ceil(span / outputs) - 1
-        self.row = self._matrix.shape[0]
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget what was filtered so far."""
-        self._before = np.zeros((self._spill, self._matrix.shape[1]), dtype=np.float32)
-
-    def filter(self, samples: SingleArray) -> SingleArray:
-        """Outputs of whole rows of samples; of complex taps real and imaginary parts alternate."""
-        rows = samples.reshape(-1, self.row)
-        spill, width = self._spill, self._width
-        product = np.empty((spill + len(rows), self._matrix.shape[1]), dtype=np.float32)
-        product[:spill] = self._before
-        np.matmul(rows, self._matrix, out=product[spill:])
-        out = product[spill:, :width].copy()
-        for late in range(1, spill + 1):
-            part = product[spill - late : spill - late + len(rows), late * width :][:, :width]
-            out[:, : part.shape[1]] += part
-        self._before = product[len(rows) :].copy()
-        return np.asarray(out.reshape(-1))
-
-
 class BlockDemodulator:
-    """The chain of `Demodulator` in two steps, each for any number of hops.
+    """The chain of `Demodulator` for any number of hops at once (`demodulate_hops`).
+
+    The result of a hop does not depend, to the last bit, on how many come in a batch.
 
     Parameters
     ----------
@@ -104,44 +57,40 @@ class BlockDemodulator:
 
     def __init__(self, chain: DemodulatorChain, hop_samples: int) -> None:
         rate = chain.discriminator_rate_hz
-        self._every = round(rate / DEMODULATED_RATE_HZ)
         front, band = equivalent_taps(chain)
-        self._front = RowFilter(front, chain.decimation, self._every, real=True)
-        # Whole rows in a hop. Four hundredths of a second hold the least products.
-        per_row = next(k for k in (4, 2, 1) if hop_samples % k == 0)
-        self._band = RowFilter(band, 1, 2 * per_row * self._every, real=False)
+        low_pass = impulse_response(chain.low_pass, _IMPULSE_REST) * rate / (2 * math.pi)
         step = 2 * math.pi * chain.carrier_hz / rate
-        self._cos, self._sin = np.float32(math.cos(step)), np.float32(math.sin(step))
-        impulse = impulse_response(chain.low_pass, _IMPULSE_REST) * rate / (2 * math.pi)
-        self._low_pass = RowFilter(impulse, self._every, 2 * hop_samples, real=True)
-        self._chain = chain
+        self._tables = (
+            _latest_last(front, WINDOW_STEP),
+            _latest_last(band, BAND_STEP),
+            _latest_last(low_pass, WINDOW_STEP)[0],
+            np.concatenate([dc_rejecter(), chain.compressor]),
+            np.array([math.cos(step), math.sin(step)], dtype=np.float32),
+        )
+        self.hop_samples = hop_samples
+        self.frame = round(chain.sample_rate_hz / SLOT_RATE_HZ) * hop_samples
+        self._fast = self.frame // chain.decimation
+        self._decimation, self._every = chain.decimation, round(rate / DEMODULATED_RATE_HZ)
         self.reset()
 
     def reset(self) -> None:
         """Forget what was received so far."""
-        self._front.reset()
-        self._band.reset()
-        self._low_pass.reset()
-        self._after = SectionFilter(np.concatenate([dc_rejecter(), self._chain.compressor]))
-        self._last = np.zeros(2, dtype=np.float32)
+        front, band, low_pass, sections, _ = self._tables
+        self._state = (
+            np.zeros(front.shape[1] - self._decimation + self.frame, dtype=np.float32),
+            np.zeros((2, band.shape[1] - 1 + self._fast), dtype=np.float32),
+            np.zeros((2, 1 + self._fast), dtype=np.float32),
+            np.zeros(low_pass.size - self._every + self._fast, dtype=np.float32),
+            np.zeros((len(sections), 2)),
+        )
 
-    def decimate(self, samples: SingleArray) -> SingleArray:
-        """First filter: passband wave, whole hops, to the discriminator's rate.
-
-        Returns
-        -------
-        float32 [2 n / decimation]
-            Real and imaginary parts alternating.
-        """
-        return self._front.filter(samples)
-
-    def demodulate(self, decimated: SingleArray, hops: int) -> tuple[FloatArray, FloatArray]:
-        """All that follows.
+    def demodulate(self, frames: RealArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Demodulate the next hops.
 
         Parameters
         ----------
-        decimated : float32 [2 m]
-            What `decimate` made of `hops` hops.
+        frames : float [hops, frame]
+            Passband wave.
 
         Returns
         -------
@@ -149,21 +98,38 @@ class BlockDemodulator:
             Instantaneous frequency about its mean, filtered [Hz].
         amplitude : float64 [hops]
             Root mean square amplitude of the carrier in its band.
+        faulty : bool [hops]
+            Which hops hold samples at fault, and were taken for zeros; what fault is said by
+            `input_fault`.
         """
-        parts = np.concatenate([self._last, self._band.filter(decimated)])
-        self._last = parts[-2:].copy()
-        row = parts[2:].reshape(hops, -1)
-        amplitude = np.sqrt(np.vecdot(row, row) * (2.0 / row.shape[1]))
-        real, imag = parts[0::2].copy(), parts[1::2].copy()
-        along = real[1:] * real[:-1] + imag[1:] * imag[:-1]
-        across = imag[1:] * real[:-1] - real[1:] * imag[:-1]
-        # The carrier's own turn from sample to sample is taken out.
-        angle = np.arctan2(
-            across * self._cos - along * self._sin, along * self._cos + across * self._sin
+        kind: type[np.signedinteger] | None = _STORED_AS.get(frames.dtype)
+        if kind is None:
+            frames, kind = frames.astype(np.float64), np.int64
+        frames = np.ascontiguousarray(frames)
+        most = int(MOST_AT_PEAK * frames.shape[1])
+        loudest = int(np.array(LOUDEST, frames.dtype).view(kind))
+        marks = np.array([np.iinfo(kind).max, loudest, most], dtype=kind)
+        hops = len(frames)
+        demodulated = np.empty((hops, self.hop_samples))
+        amplitude, faulty = np.empty(hops), np.empty(hops, dtype=np.bool_)
+        demodulate_hops(
+            frames,
+            frames.view(kind),
+            marks,
+            *self._tables,
+            *self._state,
+            demodulated,
+            amplitude,
+            faulty,
         )
-        low = self._low_pass.filter(angle)
-        compressed = self._after.filter(low.astype(np.float64))[1::2]
-        return compressed.reshape(hops, -1), np.asarray(amplitude, dtype=np.float64)
+        return demodulated, amplitude, faulty
+
+
+def _latest_last(taps: ComplexArray | FloatArray, step: int) -> SingleArray:
+    """Real and imaginary parts [2, n] backwards in time, after zeros to a multiple of `step`."""
+    spare = np.zeros(-taps.size % step)
+    rows = [np.concatenate([spare, part[::-1]]) for part in (taps.real, taps.imag)]
+    return np.array(rows, dtype=np.float32)
 
 
 def impulse_response(sections: FloatArray, rest: float) -> FloatArray:
@@ -202,7 +168,7 @@ def equivalent_taps(chain: DemodulatorChain) -> tuple[ComplexArray, ComplexArray
         edges = (STOP_HZ, low_rate - STOP_HZ)
         ripple = 10 ** (_FRONT_RIPPLE_DB / 20) - 1
         floor = 10 ** (-_FRONT_DB / 20)
-        # A row of 1/128 s and one sample: the rows of the product reach into the next one only.
+        # Of 1/128 s, as the outputs at that rate are apart.
         taps = round(rate / DEMODULATED_RATE_HZ) // 2 * 2 + 1
         low = signal.remez(
             taps, [0, *edges, rate / 2], [1, 0], weight=[1 / ripple, 1 / floor], fs=rate

@@ -147,3 +147,8 @@ class Confirmation:
         self.count = min(self.count + 1, self.needed) if same else 1
         self._word = word
         return self.count >= self.needed
+
+    @property
+    def reason(self) -> str:
+        """Why a word that is not confirmed does not count."""
+        return f"confirmed {self.count} of {self.needed} times"

@@ -1,9 +1,9 @@
 """The track-code receiver for long inputs: the same decisions, many hops at a time.
 
-The demodulated wave comes from `rail_signals.track_code.block_demodulator`. Amplitudes, residuals
-and windows of all slots of a batch are then a few matrix products. As long as the word in force
-goes on, that settles the decisions; every other hop is given to the decision stage of
-`ReferenceTrackCodeReceiver`, which is not repeated here.
+The demodulated wave comes from `rail_signals.track_code.block_demodulator`; amplitudes, residuals
+and windows of all slots of a batch from `rail_signals.track_code.slot_kernel`. As long as the word
+in force goes on, that settles the decisions, and where it changes, most of them. A slot that holds
+no word is given to the decision stage of `ReferenceTrackCodeReceiver`, which says why.
 """
 
 from __future__ import annotations
@@ -12,64 +12,65 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import repeat
-from typing import TypeAlias
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
-from rail_signals.compiled import compiled
 
-from .block_demodulator import BlockDemodulator
+from .block_demodulator import BlockDemodulator, RealArray
 from .decision import MOST_NOISE, Decision, no_slot, read_only
+from .hop_kernel import SingleArray
 from .profile import SLOT_RATE_HZ, TrackCodeProfile
 from .reference_receiver import (
     CHANGE_OVER_NOISE,
-    LOUDEST,
-    MOST_AT_PEAK,
     ReferenceTrackCodeReceiver,
     Word,
     input_fault,
 )
-
-SingleArray: TypeAlias = NDArray[np.float32]
-RealArray: TypeAlias = NDArray[np.floating]
+from .slot_kernel import SLOT_STEP, measure_slots
+from .word import decode
 
 _BATCH_HOPS = 2048
-_PIECE_BYTES = 1 << 18
-# Bits of a float but its sign, by its size in bytes: magnitudes are in the order of these numbers.
-_MAGNITUDES = {4: np.int32(0x7FFFFFFF), 8: np.int64(0x7FFFFFFFFFFFFFFF)}
 
 
 @dataclass(frozen=True)
-class _Steady:
-    """Slots of a batch, as they are where the word of the slot before stays in force.
+class _Slots:
+    """What the long slots of a batch hold, one at the end of each hop (`measure_slots`).
 
     Attributes
     ----------
-    goes_on : bool [hops]
-        Whether a hop confirms the word of the one before, if that was valid.
+    stream : float64 [slot + hops hop]
+        The demodulated wave, from the slot before the batch on [Hz].
     bits : bool [hops, tones]
     levels : float64 [hops, tones]
     parts : float32 [hops, 2 tones]
         Real, then imaginary parts of the amplitudes of the tones present [Hz].
     residual_hz : float32 [hops]
         What they leave over.
+    is_clear : bool [hops]
+        Whether levels and noise are those of a word.
+    is_changed : bool [hops]
+        Whether the tones of the slot before do not go on.
+    goes_on : bool [hops]
+        Whether a hop confirms the word of the one before, if that was valid.
     """
 
-    goes_on: BoolArray
+    stream: FloatArray
     bits: BoolArray
     levels: FloatArray
     parts: SingleArray
     residual_hz: SingleArray
+    is_clear: BoolArray
+    is_changed: BoolArray
+    goes_on: BoolArray
 
 
 class TrackCodeReceiver(ReferenceTrackCodeReceiver):
     """`ReferenceTrackCodeReceiver` for long inputs: same parameters, same decisions, less work.
 
     The levels differ from those of `ReferenceTrackCodeReceiver` by about 1e-3, from the finite
-    length of the filters, and in their last digits with the way the input is cut.
+    length of the filters. They do not depend, to the last bit, on the way the input is cut.
     Input in single precision is the fastest.
 
     Examples
@@ -104,16 +105,33 @@ class TrackCodeReceiver(ReferenceTrackCodeReceiver):
         matrix = self._estimator.matrix
         # Amplitudes and residuals of a slot in one product.
         measure = np.concatenate([matrix.real, matrix.imag, self._estimator.whitener])
-        self._measure = np.ascontiguousarray(measure.T, dtype=np.float32)
-        self._worst_spread = float(np.max(self._estimator.spread / self._deviations))
-        nothing = no_slot(profile, 0.0, "")
-        self._nothing = nothing.bits, nothing.levels
+        freedom = len(self._estimator.whitener)
+        worst_spread = float(np.max(self._estimator.spread / self._deviations))
         # One hop on, the tones of a word have turned.
         turn = np.exp(2j * math.pi * self.hop_samples / SLOT_RATE_HZ * np.array(profile.tones_hz))
-        self._wave = _real_rows(self._model)
-        self._next_wave = _real_rows(self._continued * turn)
+        self._tables = (
+            _single(np.pad(measure.T, ((0, -self._slot.size % SLOT_STEP), (0, 0)))),
+            _real_rows(self._model),
+            _real_rows(self._continued * turn),
+            self._deviations,
+            np.array(
+                [
+                    (profile.absent_max + profile.present_min) / 2,
+                    profile.absent_max,
+                    profile.present_min,
+                    profile.present_max,
+                    freedom * (MOST_NOISE / worst_spread) ** 2,
+                    CHANGE_OVER_NOISE,
+                    self._least_change_hz,
+                ]
+            ),
+        )
+        nothing = no_slot(profile, 0.0, "")
+        self._nothing = nothing.bits, nothing.levels
         self._valid = False
         self._fields: Mapping[str, int] | None = None
+        self._word_decoded = b""
+        self._message: Mapping[str, int] | None = None
 
     def reset(self) -> None:
         """Forget everything received; the next sample is the first."""
@@ -150,15 +168,10 @@ class TrackCodeReceiver(ReferenceTrackCodeReceiver):
     def _decide_frames(self, frames: RealArray) -> list[Decision]:
         """Decisions of a batch of hops [hops, frame]."""
         hops = len(frames)
-        decimated, faulty = self._decimated(frames)
-        demodulated, amplitude = self._fast_demodulator.demodulate(decimated, hops)
-        stream = np.concatenate([self._slot, demodulated.ravel()])
-        # The first is the slot before the batch.
-        every = sliding_window_view(stream, self._slot.size)[:: self.hop_samples]
-        slots = every.astype(np.float32)
-        steady = self._measured(slots)
+        demodulated, amplitude, faulty = self._fast_demodulator.demodulate(frames)
+        slots = self._measured(np.concatenate([self._slot, demodulated.ravel()]), hops)
         faulty |= amplitude < self._least_amplitude
-        steady.goes_on[faulty] = False
+        slots.goes_on[faulty] = False
         decisions: list[Decision] = []
 
         def decide_until(stop: int) -> None:
@@ -167,24 +180,24 @@ class TrackCodeReceiver(ReferenceTrackCodeReceiver):
                 if not faulty[k] and self._must_wait():
                     decisions.append(self._wait())
                     continue
-                self._valid = False
-                self._slot = every[k]
-                fault = input_fault(frames[k]) if faulty[k] else ""
-                decision = self._take(fault, demodulated[k], float(amplitude[k]))
+                if faulty[k]:
+                    decisions.append(self._begin_anew(input_fault(frames[k]) or "no carrier"))
+                    continue
+                decision = self._decide_slot(slots, k)
                 decisions.append(decision)
                 if decision.valid:
                     self._valid, self._fields = True, decision.fields
                     return
 
-        for stop in [*np.flatnonzero(~steady.goes_on).tolist(), hops]:
+        for stop in [*np.flatnonzero(~slots.goes_on).tolist(), hops]:
             while len(decisions) < stop:
                 if not self._valid:
                     decide_until(stop)
                 else:
-                    decisions += self._continued_decisions(steady, len(decisions), stop)
+                    decisions += self._continued_decisions(slots, len(decisions), stop)
             # Here the word may end.
             decide_until(min(stop + 1, hops))
-        self._slot = every[-1].copy()
+        self._slot = slots.stream[slots.stream.size - self._slot.size :].copy()
         return decisions
 
     def _must_wait(self) -> bool:
@@ -200,52 +213,94 @@ class TrackCodeReceiver(ReferenceTrackCodeReceiver):
         bits, levels = self._nothing
         return Decision(self.time_s, bits, levels, False, None, f"slot lacks {missing_s:.3f} s")
 
-    def _decimated(self, frames: RealArray) -> tuple[SingleArray, BoolArray]:
-        """First filter over a batch of hops, and which hops are faulty and count as zeros.
+    def _begin_anew(self, fault: str) -> Decision:
+        """Decision of a hop at fault."""
+        self._valid = False
+        self._hops += 1
+        self._restart(-self.chain.settling_samples)
+        return no_slot(self.profile, self.time_s, fault)
 
-        In pieces that stay in the processor's cache.
-        """
-        step = max(1, _PIECE_BYTES // (frames.itemsize * self._frame))
-        parts, faulty = [], []
-        for start in range(0, len(frames), step):
-            piece = frames[start : start + step]
-            fault = _input_faults(piece)
-            if fault.any():
-                piece = np.where(fault[:, None], 0, piece)
-            parts.append(self._fast_demodulator.decimate(piece.astype(np.float32, copy=False)))
-            faulty.append(fault)
-        return np.concatenate(parts), np.concatenate(faulty)
+    def _decide_slot(self, slots: _Slots, k: int) -> Decision:
+        """Decision of a hop with a full slot: what `_take` does, from what is known of it."""
+        self._valid = False
+        self._hops += 1
+        self._fresh += self.hop_samples
+        if self._word is not None:
+            is_latest = self._word.sample == self._now - self.hop_samples
+            self._slot = self._slot_of(slots, k)
+            if slots.is_changed[k] if is_latest else self._change_noticed():
+                self._restart(0)
+                return no_slot(self.profile, self.time_s, "change noticed")
+        bits = slots.bits[k]
+        fields = self._decoded(bits) if slots.is_clear[k] else None
+        if fields is None:
+            self._slot = self._slot_of(slots, k)
+            return self._decide()
+        if not self._confirmation.confirm(bits):
+            reason = self._confirmation.reason
+            return Decision(self.time_s, bits, slots.levels[k], False, None, reason)
+        self._put_in_force(slots, k)
+        return Decision(self.time_s, bits, slots.levels[k], True, fields, "")
 
-    def _measured(self, slots: SingleArray) -> _Steady:
-        """Levels of all slots, and where the word of the slot before goes on."""
-        profile, tones = self.profile, self.profile.tones
-        measured = slots @ self._measure
-        amplitudes, left = measured[:, : 2 * tones], measured[:, 2 * tones :]
-        real, imag = amplitudes[:, :tones], amplitudes[:, tones:]
-        levels = np.sqrt(real * real + imag * imag) / self._deviations
-        noise = np.sqrt(np.vecdot(left, left) / left.shape[1]) * self._worst_spread
-        bits = levels > (profile.absent_max + profile.present_min) / 2
-        present = (levels >= profile.present_min) & (levels <= profile.present_max)
-        clear = (present | (levels <= profile.absent_max)).all(axis=1) & (noise <= MOST_NOISE)
-        parts = amplitudes * np.concatenate([bits, bits], axis=1)
-        residual = _rms(slots - parts @ self._wave)
-        change = _rms(slots[1:, -self._short :] - parts[:-1] @ self._next_wave)
-        limit = np.maximum(CHANGE_OVER_NOISE * residual[:-1], self._least_change_hz)
-        goes_on = (bits[1:] == bits[:-1]).all(axis=1) & clear[1:] & ~(change > limit)
-        return _Steady(goes_on, read_only(bits)[1:], read_only(levels)[1:], parts[1:], residual[1:])
+    def _slot_of(self, slots: _Slots, k: int) -> FloatArray:
+        """The long slot at the end of hop `k` of a batch."""
+        start = (k + 1) * self.hop_samples
+        return slots.stream[start : start + self.profile.slot_samples]
 
-    def _continued_decisions(self, steady: _Steady, start: int, stop: int) -> list[Decision]:
+    def _decoded(self, bits: BoolArray) -> Mapping[str, int] | None:
+        """`decode` of the bits; those of the call before are not decoded again."""
+        key = bits.tobytes()
+        if key != self._word_decoded:
+            self._word_decoded, self._message = key, decode(self.profile, bits)
+        return self._message
+
+    def _put_in_force(self, slots: _Slots, k: int) -> None:
+        """Let the word of the slot at the end of hop `k`, which is the newest, be in force."""
+        parts, tones = slots.parts[k], self.profile.tones
+        amplitudes = parts[:tones] + 1j * parts[tones:]
+        self._word = Word(amplitudes, self._now, float(slots.residual_hz[k]))
+
+    def _measured(self, stream: FloatArray, hops: int) -> _Slots:
+        """What the slots of a batch hold; the stream begins with the slot before them."""
+        size, tones = 1 + hops, self.profile.tones
+        bits, levels = np.empty((size, tones), dtype=np.bool_), np.empty((size, tones))
+        parts = np.empty((size, 2 * tones), dtype=np.float32)
+        residual_hz = np.empty(size, dtype=np.float32)
+        is_clear, is_changed = np.empty(size, dtype=np.bool_), np.empty(size, dtype=np.bool_)
+        single = np.zeros(stream.size + SLOT_STEP, dtype=np.float32)
+        single[: stream.size] = stream
+        measure_slots(
+            single,
+            self.hop_samples,
+            *self._tables,
+            bits,
+            levels,
+            parts,
+            residual_hz,
+            is_clear,
+            is_changed,
+        )
+        goes_on = (bits[1:] == bits[:-1]).all(axis=1) & is_clear[1:] & ~is_changed[1:]
+        return _Slots(
+            stream,
+            read_only(bits)[1:],
+            read_only(levels)[1:],
+            parts[1:],
+            residual_hz[1:],
+            is_clear[1:],
+            is_changed[1:],
+            goes_on,
+        )
+
+    def _continued_decisions(self, slots: _Slots, start: int, stop: int) -> list[Decision]:
         """Decisions from hop `start` to `stop`, in which the word in force goes on."""
         first = self._hops + 1
         self._hops += stop - start
         self._fresh += (stop - start) * self.hop_samples
-        tones = self.profile.tones
-        parts = steady.parts[stop - 1]
-        self._word = Word(
-            parts[:tones] + 1j * parts[tones:], self._now, float(steady.residual_hz[stop - 1])
-        )
+        self._put_in_force(slots, stop - 1)
         times = np.arange(first, self._hops + 1) * self.hop_samples / SLOT_RATE_HZ
-        bits, levels = steady.bits[start:stop], steady.levels[start:stop]
+        # One row of bits does for all: they are the same.
+        bits, levels = repeat(slots.bits[start]), slots.levels[start:stop]
         each = zip(times.tolist(), bits, levels, repeat(True), repeat(self._fields), repeat(""))
         # As `Decision._make`, without a call of Python for each.
         return list(map(tuple.__new__, repeat(Decision), each))
@@ -253,55 +308,8 @@ class TrackCodeReceiver(ReferenceTrackCodeReceiver):
 
 def _real_rows(waves: ComplexArray) -> SingleArray:
     """Map from real and imaginary parts of amplitudes to ``Re(waves @ amplitudes)``."""
-    rows = np.concatenate([waves.real, -waves.imag], axis=1).T
-    return np.ascontiguousarray(rows, dtype=np.float32)
+    return _single(np.concatenate([waves.real, -waves.imag], axis=1).T)
 
 
-def _rms(rows: SingleArray) -> SingleArray:
-    return np.asarray(np.sqrt(np.vecdot(rows, rows) / rows.shape[1]))
-
-
-def _input_faults(frames: RealArray) -> BoolArray:
-    """Which hops [hops, frame] hold samples at fault; what fault is said hop by hop."""
-    whole = frames if frames.itemsize in _MAGNITUDES else frames.astype(np.float64)
-    mask = _MAGNITUDES[whole.itemsize]
-    peak_bits, at_peak = np.empty(len(frames), mask.dtype), np.empty(len(frames), np.intp)
-    _peaks(np.ascontiguousarray(whole).view(mask.dtype), mask, peak_bits, at_peak)
-    peak = peak_bits.view(whole.dtype)
-    sound = (peak > 0) & (peak <= LOUDEST) & (at_peak <= MOST_AT_PEAK * frames.shape[1])
-    return np.asarray(~sound, dtype=np.bool_)
-
-
-@compiled
-def _peaks(
-    bits: NDArray[np.signedinteger],
-    mask: np.signedinteger,
-    peak: NDArray[np.signedinteger],
-    at_peak: NDArray[np.intp],
-) -> None:
-    """Largest magnitude of every hop, and how many samples have it.
-
-    Integers are compared, which several lanes at once can do in any order; NaN is the largest.
-
-    Parameters
-    ----------
-    bits : int32 or int64 [hops, frame]
-        Floats as they are stored.
-    mask
-        All bits but the sign.
-    peak : int32 or int64 [hops]
-        Bits of the largest magnitude; result.
-    at_peak : intp [hops]
-        Result.
-    """
-    for hop in range(len(bits)):
-        row = bits[hop]
-        most = mask ^ mask
-        for i in range(len(row)):
-            most = max(most, row[i] & mask)
-        peak[hop] = most
-        most = peak[hop]  # as narrow as the samples
-        count = 0
-        for i in range(len(row)):
-            count += (row[i] & mask) == most
-        at_peak[hop] = count
+def _single(array: FloatArray) -> SingleArray:
+    return np.ascontiguousarray(array, dtype=np.float32)

@@ -200,7 +200,7 @@ class ReferenceTrackCodeReceiver:
         if fields is None:
             self._confirmation.reset()
         elif not self._confirmation.confirm(bits):
-            reason = f"confirmed {self._confirmation.count} of {self._confirmation.needed} times"
+            reason = self._confirmation.reason
         else:
             present = np.where(bits, amplitudes, 0)
             left = self._slot - (self._model @ present).real

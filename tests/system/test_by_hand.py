@@ -15,7 +15,7 @@ from rclpy.parameter_client import AsyncParameterClient
 
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plan.plan import REPORT, make_plan
-from rail_msgs_py.topics.tick import CLOCK
+from rail_msgs_py.topics.tick import CLOCK, FAILED
 
 if TYPE_CHECKING:
     from .conftest import Listener, Rail
@@ -56,6 +56,31 @@ def test_a_second_node_of_a_name_ends_with_one_line(rail: Rail, listener: Listen
     topic = f"{full_name}/zone1/tx"
     listener.until(lambda: listener.node.count_publishers(topic) > 1 or third.poll() is not None)
     assert third.poll() is None
+
+
+def test_a_station_killed_in_the_one_process_comes_back_in_one_of_its_own(
+    rail: Rail, listener: Listener, tmp_path: Path
+) -> None:
+    changed = ("plain_line", "--duration", 30)
+    written, path = tmp_path / "written", tmp_path / "report.json"
+    assert rail.finish(rail.start("plan", *changed, "--write", written)) == 0
+    failed = listener.listen(FAILED)
+    run = rail.start(
+        *("run", *changed, "--processes", "one", "--rate", 3),
+        *("--kill", "/wayside/wrs3@0.5", "--report", path),
+    )
+    listener.until(lambda: failed)
+    station = rail.start(
+        *("--ros-args", "-r", "__ns:=/wayside", "-r", "__node:=wrs3"),
+        *("--params-file", written / "parameters" / "wayside_wrs3.yaml"),
+        command=[sys.executable, "-m", "rail_wayside.ranging.wrs_node"],
+    )
+    assert rail.finish(run) == 0
+    assert station.poll() is None
+    # The train is in its zone from 20.8 to 34.5 s.
+    train = json.loads(path.read_text())["trains"]["train_a"]
+    assert train["handovers"]["made"] == train["handovers"]["expected"] >= 2
+    assert train["phase_ranging"]["availability"] == 1.0
 
 
 @pytest.mark.parametrize(("scenario", "limit_s"), [("demo", 3.0), ("moving_block", 12.0)])

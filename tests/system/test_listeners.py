@@ -1,0 +1,93 @@
+"""Who listens from outside, and when, is not seen in a run; who listens hears every message."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rail_msgs_py.cdr_stamp import stamp_reader
+from rail_msgs_py.topics.ranging import POSITION, RANGE, WRS_RX, WRS_TX
+from rail_msgs_py.topics.tick import CLOCK, DIAGNOSTICS
+from rail_msgs_py.topics.world import STATE
+
+if TYPE_CHECKING:
+    from rail_msgs_py.topics.topic import Topic
+
+    from .conftest import Listener, Rail
+
+pytestmark = pytest.mark.system
+_RUN = ("run", "plain_line", "--duration", 40, "--processes", "one")
+_ZONE = {"site": "wrs2", "zone": "zone2"}
+#: Streams and estimates, which are not sent while nobody listens.
+_TOPICS: tuple[tuple[Topic, dict[str, str]], ...] = (
+    (STATE, {}),
+    (POSITION, {"train": "train_a"}),
+    (WRS_TX, _ZONE),
+    (WRS_RX, _ZONE),
+    (RANGE, _ZONE),
+)
+
+
+class Visits:
+    """Listens to a topic again and again, a few messages at a time."""
+
+    def __init__(self, listener: Listener, topic: Topic, parts: dict[str, str]) -> None:
+        self._node, self._topic, self._name = listener.node, topic, topic.name(**parts)
+        self.visits: list[list[bytes]] = []
+        self._come()
+
+    def _come(self) -> None:
+        heard: list[bytes] = []
+        self.visits.append(heard)
+        self._subscription = self._node.create_subscription(
+            self._topic.type, self._name, heard.append, self._topic.qos, raw=True
+        )
+
+    def go_and_come(self) -> None:
+        """Begin another visit once this one has heard enough."""
+        if len(self.visits[-1]) >= 10:
+            self._node.destroy_subscription(self._subscription)
+            self._come()
+
+
+def test_listeners_that_come_and_go_change_nothing_and_miss_nothing(
+    rail: Rail, listener: Listener
+) -> None:
+    path = rail.directory / "report.json"
+    visits = [Visits(listener, topic, parts) for topic, parts in _TOPICS]
+    run = rail.start(*_RUN, "--rate", 8, "--report", path)
+
+    def over() -> bool:
+        for each in visits:
+            each.go_and_come()
+        return run.poll() is not None
+
+    listener.until(over)
+    assert run.returncode == 0, rail.errors(run)
+    report = json.loads(path.read_text())
+    alone = rail.report(*_RUN[1:])
+    assert report["digest"] == alone["digest"] and report["missing_ticks"] == 0
+    assert report["events"] == alone["events"]
+    for each, (topic, _) in zip(visits, _TOPICS, strict=True):
+        assert len(each.visits) > 5, each
+        read = stamp_reader(topic.type)
+        for heard in filter(None, each.visits):
+            stamps: list[Any] = [read(bytes(raw)) for raw in heard]
+            assert stamps == list(range(stamps[0], stamps[-1] + 1, 100_000_000)), topic.pattern
+
+
+def test_who_joins_a_process_hears_the_tick_at_hand_and_the_health_of_all(
+    rail: Rail, listener: Listener
+) -> None:
+    clock = listener.listen(CLOCK)
+    run = rail.start(*_RUN, "--rate", 8)
+    listener.until(lambda: len(clock) > 20)
+    joined_s = clock[-1].clock.sec + clock[-1].clock.nanosec * 1e-9
+    health: list[Any] = listener.listen(DIAGNOSTICS)
+    nodes = {f"/wayside/wrs{number}" for number in range(1, 7)} | {"/world", "/report"}
+    listener.until(lambda: nodes <= {status.hardware_id for m in health for status in m.status})
+    said_s = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in health]
+    assert joined_s - 0.1 < said_s[0] < joined_s + 3.0
+    assert rail.finish(run) == 0

@@ -32,7 +32,7 @@ from rail_signals.arrays import FloatArray
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 
 from .shift_cost import ShiftCost
-from .shift_kernel import cost_profile, deepest_minima
+from .shift_kernel import cost_profile, deepest_minima, nearest_stations
 from .surveyed_line import SurveyedLine
 from .tone_plan import TonePlan
 
@@ -160,12 +160,8 @@ class DopplerSolver:
 
     def stations_of(self, slots: ArrayLike, near_m: float) -> NDArray[np.int64]:
         """Station of each slot that stands nearest to a chainage; -1 where there is none."""
-        away_m = np.abs(self.feet_m - near_m)
-        solutions = []
-        for slot in np.atleast_1d(np.asarray(slots)).tolist():
-            here = np.flatnonzero(self.slots == slot)
-            solutions.append(int(here[np.argmin(away_m[here])]) if here.size else -1)
-        return np.array(solutions, dtype=np.int64)
+        asked = np.atleast_1d(np.asarray(slots, dtype=np.int64))
+        return nearest_stations(asked, self.slots, self.feet_m, float(near_m))
 
     def solve(
         self,

@@ -10,6 +10,7 @@ import pytest
 
 from rail_signals.doppler.signal import block_times_s, received_tones
 from rail_signals.doppler.solver import DopplerSolver
+from rail_signals.doppler.station_kernel import gather_received
 from rail_signals.doppler.surveyed_line import SurveyedLine
 from rail_signals.doppler.tone_fit import ToneFitter
 from rail_signals.doppler.tone_kernel import PHASE_TERMS, PIECES, _turn_back, fit_tones
@@ -175,3 +176,19 @@ def test_compiled_is_the_plain_form() -> None:
         assert kernel(*given, *results) == kernel.py_func(*given, *plain)
         for one, other in zip(results, plain, strict=True):
             np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
+
+
+def test_what_is_received_is_gathered_by_station() -> None:
+    rng = np.random.default_rng(5)
+    stations_m, effects = rng.normal(size=(6, 3)), rng.normal(size=(6, 2))
+    number, z, variance = np.array([4, 0, 5]), rng.normal(size=3), rng.uniform(1.0, 2.0, 3)
+    expected = np.column_stack([stations_m[number], z, 1.0 / variance, effects[number]])
+    for gather in (gather_received, gather_received.py_func):  # type: ignore[attr-defined]
+        received = np.empty((3, 7))
+        assert gather(number, z, variance, stations_m, effects, received)
+        np.testing.assert_array_equal(received, expected)
+        for wrong in (np.nan, np.inf, -1.0, 0.0):
+            bad = variance.copy()
+            bad[1] = wrong
+            assert not gather(number, z, bad, stations_m, effects, received)
+        assert not gather(number, z * np.inf, variance, stations_m, effects, received)

@@ -270,20 +270,6 @@ def cost_profile(
 
 
 @compiled
-def nearest_stations(
-    asked: NDArray[np.int64], slots: NDArray[np.int64], feet_m: FloatArray, near_m: float
-) -> NDArray[np.int64]:
-    """Of the stations in each slot the nearest to a chainage, the first of two; -1 if none."""
-    stations = np.full(len(asked), -1)
-    for i in range(len(asked)):
-        nearest_m = inf
-        for station in range(len(slots)):
-            if slots[station] == asked[i] and abs(feet_m[station] - near_m) < nearest_m:
-                stations[i], nearest_m = station, abs(feet_m[station] - near_m)
-    return stations
-
-
-@compiled
 def deepest_minima(cost: FloatArray, most: int) -> tuple[float, NDArray[np.int64]]:
     """Least cost, and places of the deepest minima within, at most so many, deepest first."""
     where = np.empty(most, dtype=np.int64)

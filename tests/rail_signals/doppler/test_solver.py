@@ -168,6 +168,8 @@ def test_bad_input_is_refused() -> None:
         solver.solve([0, 1], [np.nan, 1.0], [1.0, 1.0])
     with pytest.raises(ValueError, match="variances above zero"):
         solver.solve([0, 1], [1.0, 1.0], [1.0, 0.0])
+    with pytest.raises(ValueError, match="numbers below"):
+        solver.solve([0, 99], [1.0, 1.0], [1.0, 1.0])
     with pytest.raises(ValueError, match="shapes differ"):
         solver.solve([0, 1], [1.0], [1.0, 1.0])
 

@@ -10,18 +10,22 @@ import pytest
 from scipy import stats
 from scipy.linalg import solve_discrete_are
 
+from rail_signals.localizer import filter_bank
 from rail_signals.localizer.filter_bank import (
     FILTERS,
     RANGE_BIAS,
+    SCALE,
     SLIP,
     STATES,
     USES,
     A,
     FilterBank,
+    MeasurementRow,
     S,
     V,
     singer,
 )
+from rail_signals.localizer.filter_kernel import predict_filters, take_scalar
 from rail_signals.localizer.readings import (
     BlockEntry,
     DopplerFix,
@@ -328,3 +332,42 @@ def test_the_difference_of_two_filters_has_the_difference_of_their_variances() -
             continue
         low, high = np.array(stats.chi2.interval(1.0 - 1e-4, runs)) / runs
         assert low < np.mean(apart**2) / gained < high, FILTERS[child]
+
+
+def test_one_train_is_one_of_many_runs() -> None:
+    """The compiled filters of one train beside whole arrays, and beside their plain form."""
+    rng = np.random.default_rng(8)
+    settings = LocalizerSettings()
+    alone, many = FilterBank(settings), FilterBank(settings, (3,))
+    plain = FilterBank(settings)
+    everywhere = np.ones(3, dtype=np.bool_)
+    for bank in (alone, plain):
+        bank.place(np.array(True), 1000.0, 2.0, 20.0, 0.1)
+    many.place(everywhere, 1000.0, 2.0, 20.0, 0.1)
+    for tick in range(60):
+        slip_mps, anew = float(rng.uniform(0.0, 0.5)), bool(tick % 20 == 10)
+        row: MeasurementRow = [(S, None), (V, -0.3), (RANGE_BIAS, None)]
+        if tick % 2:
+            row = [(V, None), (SCALE, np.array([21.0])), (SLIP, None)]
+        near = float(many.x[V if tick % 2 else S, 0, 0])
+        reading = near + float(rng.normal(scale=0.1)) + (40.0 if tick in (30, 31) else 0.0)
+        use = rng.uniform(size=len(FILTERS)) < 0.8
+        many.predict(0.25, np.full((3, 1), slip_mps), np.full((3, 1), anew))
+        expected = many.take(row, np.full((3, 1), reading), 0.04, np.stack([use] * 3))
+        with pytest.MonkeyPatch.context() as patch:
+            alone.predict(0.25, slip_mps, anew)
+            outcome = alone.take(row, reading, 0.04, use)
+            for kernel in (predict_filters, take_scalar):
+                patch.setattr(filter_bank, kernel.__name__, kernel.py_func)  # type: ignore[attr-defined]
+            plain.predict(0.25, slip_mps, anew)
+            plain.take(row, reading, 0.04, use)
+        np.testing.assert_allclose(outcome.innovation, expected.innovation[0], atol=1e-9)
+        np.testing.assert_allclose(outcome.variance, expected.variance[0], rtol=1e-9)
+        assert (outcome.refused is None) == (expected.refused is None)
+        assert outcome.refused is not None or tick not in (30, 31)
+        if outcome.refused is not None and expected.refused is not None:
+            np.testing.assert_array_equal(outcome.refused, expected.refused[0])
+        for bank in (alone, plain):
+            np.testing.assert_allclose(bank.x, many.x[:, 0], rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(bank.p, many.p[:, :, 0], rtol=1e-9, atol=1e-9)
+            np.testing.assert_array_equal(bank.p, bank.p.swapaxes(0, 1))

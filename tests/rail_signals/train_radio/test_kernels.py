@@ -9,15 +9,20 @@ import pytest
 from scipy.signal import upfirdn
 from scipy.special import j0
 
-from rail_signals.train_radio.burst import RadioBurstFormat
+import rail_signals.train_radio.burst as burst_module
+from rail_signals.train_radio.assembly import assemble_bursts
+from rail_signals.train_radio.burst import RadioBurstFormat, RadioBurstReceiver
 from rail_signals.train_radio.pilot_estimation import (
     PilotLevel,
     WienerEstimator,
     _channels,
     _levels,
+    wiener_estimator,
 )
 from rail_signals.train_radio.pilot_pattern import PilotPattern
 from rail_signals.train_radio.pulse import matched_filter, root_raised_cosine, shape_pulses
+from rail_signals.train_radio.reception import receive_bursts
+from rail_signals.train_radio.slots import _look_for_signals, used_slots
 from rail_signals.train_radio.space_time_block import Scheme, _combined, _encoded, scheme
 from rail_signals.train_radio.symbol_mapping import constellation
 
@@ -142,6 +147,84 @@ def test_combining_is_that_of_the_equations(name: str) -> None:
     # One channel for all bursts is one for each.
     same, _ = plan.combine(y, h[0])
     np.testing.assert_array_equal(same[0], symbols[0])
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+@pytest.mark.parametrize("points", ["bpsk", "qpsk", "16qam"])
+def test_a_burst_is_received_as_step_by_step(name: str, points: str) -> None:
+    burst = RadioBurstFormat(scheme(name), constellation(points), 123)
+    plan, pattern, rng = burst.scheme, burst.pattern, np.random.default_rng(7)
+    bits = rng.integers(0, 2, (5, 123), dtype=np.uint8)
+    air = normal(rng, 5, plan.receive, plan.transmit)
+    samples = air @ burst.transmit(bits) + 0.05 * normal(rng, 5, plan.receive, burst.samples)
+    samples[1] = 0.0
+    samples[2] = normal(rng, *samples[2].shape)
+    samples[3, 0, 5] = np.inf
+    found = RadioBurstReceiver(burst).receive(samples, doppler_hz=50.0)
+    assert found.detected.tolist() == [True, False, False, False, True]
+    estimator = wiener_estimator(pattern, 50.0 / burst.symbol_rate_hz)
+    for i in range(5):
+        if not found.detected[i]:
+            assert not (found.bits[i].any() or found.snr[i].any() or found.channel[i].any())
+            continue
+        y = burst.symbols_of(samples[i])
+        level = estimator.level(y[..., pattern.pilot_positions])
+        channel = estimator.estimate(y[..., pattern.pilot_positions], level.snr)
+        symbols, gain = plan.combine(y, channel)
+        excess = 1.0 + level.snr * estimator.error_variance(level.snr).mean(axis=0)
+        snr = gain / (level.noise_variance * excess)
+        decided = burst.constellation.decide(symbols[pattern.data_positions])[:123]
+        np.testing.assert_array_equal(found.bits[i], decided)
+        np.testing.assert_array_equal(decided, bits[i])
+        np.testing.assert_array_equal(found.channel[i], channel)
+        np.testing.assert_allclose(found.snr[i], snr[pattern.data_positions], rtol=1e-12)
+        assert found.noise_variance[i] == level.noise_variance
+        alone = RadioBurstReceiver(burst).receive(samples[i], doppler_hz=50.0)
+        np.testing.assert_array_equal(alone.snr, found.snr[i])
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+@pytest.mark.parametrize("points", ["bpsk", "qpsk", "16qam"])
+def test_a_burst_is_assembled_as_step_by_step(name: str, points: str) -> None:
+    burst = RadioBurstFormat(scheme(name), constellation(points), 123)
+    bits = np.random.default_rng(8).integers(0, 2, (3, 123), dtype=np.uint8)
+    room = burst.pattern.data_symbols * burst.constellation.bits_per_symbol
+    filled = np.concatenate([bits, np.zeros((3, room - 123), dtype=np.uint8)], axis=1)
+    data = burst.scheme.encode(burst.constellation.modulate(filled))
+    expected = burst.pattern.insert(data)
+    given = (
+        *(bits, burst.constellation.points, burst.constellation.bits_per_symbol),
+        *(burst.pattern.data_positions, burst.pattern.pilot_positions, burst.pattern.pilots),
+    )
+    for kernel in (assemble_bursts, assemble_bursts.py_func):  # type: ignore[attr-defined]
+        made = np.zeros_like(expected)
+        kernel(*given, made)
+        np.testing.assert_array_equal(made, expected)
+
+
+def test_slots_with_a_signal_are_found() -> None:
+    block = np.zeros((2, 7 * 150 + 3), dtype=np.complex128)
+    block[0, 0], block[1, 2 * 150 + 149], block[0, 4 * 150 + 70] = 1j, np.nan, 1e-300
+    block[0, 5 * 150 : 6 * 150] = -0.0
+    block[1, -1] = 1.0  # behind the last whole slot
+    assert used_slots(block, 150) == [0, 2, 4]
+    words, used = block.view(np.uint64), np.empty(7, dtype=np.bool_)
+    _look_for_signals.py_func(words, 300, used)  # type: ignore[attr-defined]
+    assert np.flatnonzero(used).tolist() == [0, 2, 4]
+
+
+def test_reception_in_plain_python_is_the_same() -> None:
+    burst = RadioBurstFormat(scheme("alamouti_2x2"), constellation("qpsk"), 24)
+    rng = np.random.default_rng(9)
+    samples = normal(rng, 2, 2, 2) @ burst.transmit(rng.integers(0, 2, (2, 24)))
+    samples += 0.05 * normal(rng, *samples.shape)
+    one = RadioBurstReceiver(burst).receive(samples)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(burst_module, "receive_bursts", receive_bursts.py_func)  # type: ignore[attr-defined]
+        other = RadioBurstReceiver(burst).receive(samples)
+    assert one.detected.all()
+    np.testing.assert_array_equal(one.bits, other.bits)
+    np.testing.assert_allclose(one.snr, other.snr, rtol=1e-13)
 
 
 def test_compiled_and_plain_python_are_one() -> None:

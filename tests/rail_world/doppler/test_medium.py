@@ -163,3 +163,17 @@ def test_a_block_of_another_length_is_refused() -> None:
 def test_a_fault_of_no_station_is_refused() -> None:
     with pytest.raises(ValueError, match="no reference station ref9"):
         medium(ReferenceFault(kind="dead_reference", station="ref9", **ALWAYS))
+
+
+def test_an_envelope_of_two_lines_is_delayed_as_one_of_each() -> None:
+    row = state("straight", 1400.0, -80.0, 0.5)
+    one = {0: 1e6 * reference_tone(PLAN, 2)}
+    both = {0: one[0] + 1e-5 * 1e6 * reference_tone(PLAN, 7)}
+    other = {0: 1e6 * reference_tone(PLAN, 7)}
+    heard = [medium().receive(3, 0.3, row, sent)[0] for sent in (one, both, other)]
+    # A line by itself is turned, an envelope of several goes through its transform.
+    kept = [medium()._sent(0, sent[0]).line for sent in (one, both, other)]
+    assert kept == [True, False, True]
+    most = np.abs(heard[0]).max()
+    np.testing.assert_allclose(heard[1], heard[0] + 1e-5 * heard[2], atol=2e-6 * most)
+    assert np.abs(heard[1] - heard[0]).max() > 5e-6 * most

@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
 from rail_signals.arrays import ComplexArray, FloatArray
+from rail_signals.compiled import compiled
 from rail_signals.ranging.bounds import complex_tone_frequency_variance_bound
 
-from .tone_fit import PHASE_TERMS, PIECES, ToneFit, ToneFitter
+from .tone_fit import ToneFit, ToneFitter
+from .tone_kernel import PHASE_TERMS, PIECES
 from .tone_plan import TonePlan
 from .tone_search import ToneSearch
 
@@ -134,8 +136,7 @@ class ToneReceiver:
         tones = self._search.find(spectrum, floor)
         if not len(tones.slots):
             return _NOTHING
-        with np.errstate(all="ignore"):
-            fit = self._fitter.fit(x, tones, floor)
+        fit = self._fitter.fit(x, tones, floor)
         noise = self._search.noise(spectrum, fit.frequency_hz)
         return self._report(tones.slots.tolist(), fit, noise)
 
@@ -196,11 +197,20 @@ def _usable(x: ComplexArray) -> bool:
     if not math.isfinite(energy) or energy == 0.0:
         return False
     # A clipped wave sits at both ends of the range again and again.
-    most = _CLIPPED_FRACTION * parts.size
-    return not (
-        np.count_nonzero(parts == np.max(parts)) >= most
-        and np.count_nonzero(parts == np.min(parts)) >= most
-    )
+    return min(_at_the_ends(parts)) < _CLIPPED_FRACTION * parts.size
+
+
+@compiled
+def _at_the_ends(values: FloatArray) -> tuple[int, int]:
+    """How many values are the largest, and how many the smallest."""
+    high, low = values[0], values[0]
+    for value in values:
+        high, low = max(high, value), min(low, value)
+    highest, lowest = 0, 0
+    for value in values:
+        highest += value == high
+        lowest += value == low
+    return highest, lowest
 
 
 _EMPTY: FloatArray = np.zeros(0)

@@ -33,6 +33,7 @@ from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 
 from .shift_cost import ShiftCost
 from .shift_kernel import cost_profile, deepest_minima
+from .station_kernel import gather_received, nearest_stations
 from .surveyed_line import SurveyedLine
 from .tone_plan import TonePlan
 
@@ -160,12 +161,8 @@ class DopplerSolver:
 
     def stations_of(self, slots: ArrayLike, near_m: float) -> NDArray[np.int64]:
         """Station of each slot that stands nearest to a chainage; -1 where there is none."""
-        away_m = np.abs(self.feet_m - near_m)
-        solutions = []
-        for slot in np.atleast_1d(np.asarray(slots)).tolist():
-            here = np.flatnonzero(self.slots == slot)
-            solutions.append(int(here[np.argmin(away_m[here])]) if here.size else -1)
-        return np.array(solutions, dtype=np.int64)
+        asked = np.atleast_1d(np.asarray(slots, dtype=np.int64))
+        return nearest_stations(asked, self.slots, self.feet_m, float(near_m))
 
     def solve(
         self,
@@ -201,23 +198,28 @@ class DopplerSolver:
         Raises
         ------
         ValueError
-            If the arrays do not fit together, or hold what is not finite.
+            If the arrays do not fit together, hold what is not finite, or there is no such
+            station.
         """
         number = np.asarray(stations, dtype=np.int64)
         z = np.asarray(shift_hz, dtype=np.float64)
         variance = np.asarray(variance_hz2, dtype=np.float64)
         if not (z.shape == variance.shape == number.shape and z.ndim == 1):
             raise ValueError(f"shapes differ: {number.shape}, {z.shape}, {variance.shape}")
-        if not (np.isfinite(z).all() and np.isfinite(variance).all() and (variance > 0.0).all()):
-            raise ValueError("shift_hz and variance_hz2 must be finite, variances above zero")
+        received = np.empty((z.size, 7))
+        if not gather_received(number, z, variance, self.stations_m, self._effects, received):
+            raise ValueError(
+                f"stations must be numbers below {self.slots.size}; shift_hz and variance_hz2"
+                " must be finite, variances above zero"
+            )
         if z.size < 2:
             return Answer(NoFixReason.TOO_FEW_STATIONS)
-        measured = _Measured(self, number, z, 1.0 / variance, offset, speed)
+        measured = _Measured(self, number, received, offset, speed)
         low_m, high_m = self.line.start_m, self.line.end_m
         if window_m is not None:
             low_m, high_m = max(low_m, window_m[0]), min(high_m, window_m[1])
-        first = int(np.searchsorted(self._grid_m, low_m))
-        last = int(np.searchsorted(self._grid_m, high_m, side="right"))
+        first = int(self._grid_m.searchsorted(low_m))
+        last = int(self._grid_m.searchsorted(high_m, side="right"))
         if last - first < 3:
             return Answer(NoFixReason.OFF_TRACK)
         places_m = self._grid_m[first:last]
@@ -254,21 +256,15 @@ class _Measured:
         self,
         solver: DopplerSolver,
         number: NDArray[np.int64],
-        z: FloatArray,
-        weight: FloatArray,
+        received: FloatArray,
         offset: Prior | None,
         speed: Prior | None,
     ) -> None:
-        self._number = number
+        self._number, self._received = number, received
         self._informed = (offset is not None) + (speed is not None)
         offset = offset or solver._widest
         speed = speed or Prior(0.0, 2.0 * solver.plan.max_speed_mps)
         self._known = (speed.mean, speed.sigma**-2, offset.mean, offset.sigma**-2)
-        self._received = np.empty((len(number), 7))
-        self._received[:, :3] = solver.stations_m[number]
-        self._received[:, 3] = z
-        self._received[:, 4] = weight
-        self._received[:, 5:] = solver._effects[number]
         self.cost = ShiftCost(
             solver.line, self._received, solver.plan.averaging_time_s, self._known
         )

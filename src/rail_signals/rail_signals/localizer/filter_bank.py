@@ -21,7 +21,7 @@ with the states first NumPy's inner loops run over runs and filters instead of o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from itertools import combinations
 from math import ceil, log2
@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from .filter_kernel import predict_filters, take_scalar
 from .settings import LocalizerSettings, MotionModel, Sensor
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -129,6 +130,27 @@ def combine(row: MeasurementRow, by_state: FloatArray) -> FloatArray:
     return total
 
 
+def _plain(values: Iterable[Values | None]) -> list[float] | None:
+    """Floats, one for None; None if a value is not the same for all filters.
+
+    Examples
+    --------
+    >>> _plain([None, 2.0, np.array([3.0])]), _plain([np.zeros(11)])
+    ([1.0, 2.0, 3.0], None)
+    """
+    numbers: list[float] = []
+    for value in values:
+        if value is None:
+            numbers.append(1.0)
+        elif isinstance(value, float):
+            numbers.append(value)
+        elif np.size(value) == 1:
+            numbers.append(float(np.asarray(value).item()))
+        else:
+            return None
+    return numbers
+
+
 class FilterBank:
     """States and covariances of all filters of all runs.
 
@@ -150,7 +172,7 @@ class FilterBank:
     """
 
     def __init__(self, settings: LocalizerSettings, shape: tuple[int, ...] = ()) -> None:
-        self._motion = settings.motion
+        self._motion, self._alone = settings.motion, not shape
         self._gate2 = settings.claim.threshold(1) ** 2
         motion, wheels = settings.motion, settings.odometer
         bias_m, doppler = settings.ranging.bias_m, settings.doppler
@@ -224,6 +246,12 @@ class FilterBank:
         """
         x, p = self.x, self.p
         transition, added = singer(step_s, self._motion)
+        self._settled[SLIP] = np.square(slip_mps)
+        if self._alone:
+            anew = RANGE_BIAS if new_station is not False and np.any(new_station) else -1
+            pace = self._per_m, self._per_s, self._settled
+            predict_filters(x, p, step_s, transition, added, *pace, anew)
+            return
         decay = np.exp(self._per_m * (step_s * np.abs(x[V])) + step_s * self._per_s)
         if new_station is not False:
             decay[RANGE_BIAS] *= np.logical_not(new_station)
@@ -242,7 +270,6 @@ class FilterBank:
         p *= decay[:, None] * decay
 
         p[:3, :3] += added.reshape(self._corner)
-        self._settled[SLIP] = np.square(slip_mps)
         decay *= decay
         self.variances += self._settled * (1.0 - decay)
 
@@ -260,6 +287,8 @@ class FilterBank:
         use : bool [..., filter]
             Which filters it is offered to.
         """
+        if self._alone and (numbers := _plain((reading, variance, *(c for _, c in row)))):
+            return self._take_alone([state for state, _ in row], numbers, use)
         g = combine(row, self.p)
         innovation = reading - combine(row, self.x)
         total = combine(row, g) + variance
@@ -274,6 +303,28 @@ class FilterBank:
         self.x += g * normal
         self.p -= g[:, None] * g
         return UpdateResult(refused, innovation, total)
+
+    def _take_alone(
+        self, states: Sequence[int], numbers: Sequence[float], use: BoolArray
+    ) -> UpdateResult:
+        """Take a reading of one train: its value and variance, and the coefficients."""
+        reading, variance, *factors = numbers
+        refused = np.empty(use.shape, dtype=np.bool_)
+        innovation, total = np.empty(use.shape), np.empty(use.shape)
+        outside = take_scalar(
+            self.x,
+            self.p,
+            np.array(states),
+            np.array(factors),
+            reading,
+            variance,
+            self._gate2,
+            use,
+            refused,
+            innovation,
+            total,
+        )
+        return UpdateResult(refused if outside else None, innovation, total)
 
     def start(self, chainage_m: Values, use: BoolArray) -> None:
         """Let filters that know no position begin about a fix, to be taken right after."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 from math import inf
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from .integrity_monitor import HYPOTHESES, IntegrityMonitor
 from .settings import SENSORS, IntegrityClaim, Sensor
 
 IntArray: TypeAlias = NDArray[np.int64]
+_NO_SENSOR: Final[frozenset[Sensor]] = frozenset()
 
 
 class Status(IntEnum):
@@ -147,7 +148,8 @@ class Localization:
 
 
 def _sensors(flags: list[bool]) -> frozenset[Sensor]:
-    return frozenset(sensor for sensor in Sensor if flags[sensor])
+    # Nearly always none is: the members of an enumeration are slow to go through.
+    return frozenset(sensor for sensor in Sensor if flags[sensor]) if any(flags) else _NO_SENSOR
 
 
 class ProtectionLevels:

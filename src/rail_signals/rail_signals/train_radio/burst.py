@@ -21,20 +21,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rail_signals.arrays import BoolArray, ComplexArray, FloatArray
-from rail_signals.compiled import compiled
+from rail_signals.arrays import ComplexArray, FloatArray
 
+from .assembly import assemble_bursts
 from .pilot_estimation import wiener_estimator
 from .pilot_pattern import PilotPattern
 from .pulse import matched_filter, root_raised_cosine, shape_pulses
+from .reception import LARGEST, LEAST_NOISE, receive_bursts
 from .space_time_block import Scheme
-from .symbol_mapping import BitArray, Constellation
-
-_LARGEST = 1e100
-"""Samples beyond it would overflow when squared."""
-
-_LEAST_NOISE = 1e-9
-"""Least fraction of the power that counts as noise, so that no SNR is infinite."""
+from .symbol_mapping import BitArray, Constellation, check_bits
 
 
 def noise_variance(
@@ -140,7 +135,12 @@ class RadioBurstFormat:
         """Pulse of unit energy, float64 [2 span samples_per_symbol + 1]."""
         return root_raised_cosine(self.rolloff, self.samples_per_symbol, self.span_symbols)
 
-    @property
+    @cached_property
+    def rows(self) -> tuple[int, int, int]:
+        """Shape of the parts of a wave, a row per symbol time [row, samples_per_symbol, 2]."""
+        return self.pattern.symbols + 2 * self.span_symbols, self.samples_per_symbol, 2
+
+    @cached_property
     def samples(self) -> int:
         """Samples of a burst, the tails of its pulses included."""
         return (self.pattern.symbols + 2 * self.span_symbols) * self.samples_per_symbol
@@ -180,13 +180,22 @@ class RadioBurstFormat:
         values = np.asarray(bits)
         if values.ndim == 0 or values.shape[-1] != self.data_bits:
             raise ValueError(f"bits must be [..., {self.data_bits}], got shape {values.shape}")
-        room = self.pattern.data_symbols * self.constellation.bits_per_symbol
-        if room > self.data_bits:
-            fill = np.zeros((*values.shape[:-1], room - self.data_bits), dtype=values.dtype)
-            values = np.concatenate([values, fill], axis=-1)
-        symbols = self.constellation.modulate(values)
-        burst = self.pattern.insert(self.scheme.encode(symbols))
-        wave = np.empty((*burst.shape[:-1], self.samples), dtype=np.complex128)
+        rows = check_bits(values).reshape(-1, self.data_bits)
+        burst = np.empty(
+            (len(rows), self.scheme.transmit, self.pattern.symbols), dtype=np.complex128
+        )
+        assemble_bursts(
+            rows,
+            self.constellation.points,
+            self.constellation.bits_per_symbol,
+            self.pattern.data_positions,
+            self.pattern.pilot_positions,
+            self.pattern.pilots,
+            burst,
+        )
+        wave = np.empty(
+            (*values.shape[:-1], self.scheme.transmit, self.samples), dtype=np.complex128
+        )
         shape_pulses(_parts(burst), self.pulse, self._rows(wave))
         return wave
 
@@ -208,8 +217,7 @@ class RadioBurstFormat:
 
     def _rows(self, waves: ComplexArray) -> FloatArray:
         """Parts of waves, a row per symbol time: a view [wave, row, samples_per_symbol, 2]."""
-        rows = self.pattern.symbols + 2 * self.span_symbols
-        return _parts(waves).reshape(-1, rows, self.samples_per_symbol, 2)
+        return _parts(waves).reshape(-1, *self.rows)
 
 
 @dataclass(frozen=True)
@@ -287,70 +295,79 @@ class RadioBurstReceiver:
         ValueError
             If a shape is wrong or the Doppler out of range.
         """
-        burst, plan, pattern = self.burst, self.burst.scheme, self.burst.pattern
-        x = np.asarray(samples, dtype=np.complex128)
+        burst, plan = self.burst, self.burst.scheme
+        x = np.ascontiguousarray(samples, dtype=np.complex128)
         if x.ndim < 2 or x.shape[-2:] != (plan.receive, burst.samples):
             raise ValueError(
                 f"samples must be [..., {plan.receive}, {burst.samples}], got shape {x.shape}"
             )
-        x = np.ascontiguousarray(x)
-        sound = self._sound(x)
-        y = burst.symbols_of(x if sound.all() else np.where(sound[..., None, None], x, 0))
-        pilots = y[..., pattern.pilot_positions]
         if channel is None:
-            estimator = wiener_estimator(pattern, doppler_hz / burst.symbol_rate_hz)
-            level = estimator.level(pilots)
-            detected = sound & (level.evidence >= self._least_evidence)
-            h = estimator.estimate(pilots, level.snr)
-            noise = level.noise_variance
-            excess = 1 + level.snr[..., None] * estimator.mean_error(level)
-        else:
-            h = np.asarray(channel, dtype=np.complex128)
-            shape = (plan.receive, plan.transmit, pattern.symbols)
-            if h.ndim < 3 or h.shape[-3:] != shape:
-                raise ValueError(f"channel must be [..., {shape}], got shape {h.shape}")
-            h = np.broadcast_to(h, (*x.shape[:-2], *shape))
-            sent = np.sum(h[..., pattern.pilot_positions] * pattern.pilots, axis=-2)
-            noise = np.mean(np.abs(pilots - sent) ** 2, axis=(-2, -1))
-            detected = sound
-            excess = np.ones((*x.shape[:-2], pattern.symbols))
-        # Pilots too: blocks of the code stand in one piece, and all of them are cheaper than some.
-        symbols, gain = plan.combine(y, h)
-        parts = _whole(y)
-        power = 2 * np.mean(parts * parts, axis=-1).reshape(noise.shape)
-        floor = np.maximum(noise, _LEAST_NOISE * power)
-        snr = np.zeros_like(gain)
-        np.divide(gain, floor[..., None] * excess, out=snr, where=detected[..., None])
-        data = pattern.data_positions
-        bits = burst.constellation.decide(symbols[..., data])[..., : burst.data_bits]
-        if not detected.all():
-            bits = bits * detected[..., None]
-            h = h * detected[..., None, None, None]
+            return self._receive(x, doppler_hz)
+        return self._receive_through(x, np.asarray(channel, dtype=np.complex128))
+
+    def _receive(self, x: ComplexArray, doppler_hz: float) -> ReceivedBurst:
+        """Receive bursts through a channel that their pilots tell."""
+        burst, plan, pattern = self.burst, self.burst.scheme, self.burst.pattern
+        estimator = wiener_estimator(pattern, doppler_hz / burst.symbol_rate_hz)
+        parts = _whole(x)
+        count = len(parts)
+        bits = np.zeros((count, burst.data_bits), dtype=np.uint8)
+        snr = np.zeros((count, pattern.data_symbols))
+        h = np.zeros((count, plan.receive, plan.transmit, pattern.symbols), dtype=np.complex128)
+        noise, detected = np.zeros(count), np.zeros(count, dtype=np.bool_)
+        receive_bursts(
+            parts,
+            parts.reshape(count, plan.receive, *burst.rows),
+            burst.pulse,
+            pattern.pilot_positions,
+            pattern.data_positions,
+            burst.constellation.bits_per_symbol,
+            self._least_evidence,
+            *estimator.tables,
+            bits,
+            snr,
+            h,
+            h.view(np.float64).reshape(count, plan.receive, 2 * plan.transmit * pattern.symbols),
+            noise,
+            detected,
+        )
+        lead = x.shape[:-2]
         return ReceivedBurst(
-            bits=np.asarray(bits, dtype=np.uint8),
-            snr=snr[..., data],
-            channel=h,
-            noise_variance=noise,
-            detected=np.asarray(detected),
+            bits.reshape(*lead, burst.data_bits),
+            snr.reshape(*lead, pattern.data_symbols),
+            h.reshape(*lead, *h.shape[1:]),
+            noise.reshape(lead),
+            detected.reshape(lead),
         )
 
-    def _sound(self, samples: ComplexArray) -> BoolArray:
-        """Which bursts can be worked with: finite, and not zero altogether; bool [...]."""
-        sound = np.empty(samples.shape[:-2], dtype=np.bool_)
-        _check_samples(_whole(samples), sound.reshape(-1))
-        return sound
-
-
-@compiled
-def _check_samples(parts: FloatArray, sound: BoolArray) -> None:
-    """Whether bursts [burst, parts of samples] are below the largest and not all zero."""
-    for burst in range(len(parts)):
-        fit, some = 0, 0
-        for value in parts[burst]:
-            # A comparison with NaN is false.
-            fit += abs(value) < _LARGEST
-            some += value != 0.0
-        sound[burst] = fit == parts.shape[1] and some > 0
+    def _receive_through(self, x: ComplexArray, h: ComplexArray) -> ReceivedBurst:
+        """Receive bursts through a known channel."""
+        burst, plan, pattern = self.burst, self.burst.scheme, self.burst.pattern
+        shape = (plan.receive, plan.transmit, pattern.symbols)
+        if h.ndim < 3 or h.shape[-3:] != shape:
+            raise ValueError(f"channel must be [..., {shape}], got shape {h.shape}")
+        h = np.broadcast_to(h, (*x.shape[:-2], *shape))
+        parts = _whole(x)
+        usable = (np.abs(parts) < LARGEST).all(axis=-1) & parts.any(axis=-1)
+        detected = np.asarray(usable.reshape(x.shape[:-2]))
+        y = burst.symbols_of(np.where(detected[..., None, None], x, 0))
+        sent = np.sum(h[..., pattern.pilot_positions] * pattern.pilots, axis=-2)
+        left = np.abs(y[..., pattern.pilot_positions] - sent) ** 2
+        noise = np.asarray(np.mean(left, axis=(-2, -1)))
+        # Pilots too: blocks of the code stand in one piece, and all of them are cheaper than some.
+        symbols, gain = plan.combine(y, h)
+        floor = np.maximum(noise, LEAST_NOISE * np.mean(np.abs(y) ** 2, axis=(-2, -1)))
+        snr = np.zeros_like(gain)
+        np.divide(gain, floor[..., None], out=snr, where=detected[..., None])
+        data = pattern.data_positions
+        bits = burst.constellation.decide(symbols[..., data])[..., : burst.data_bits]
+        return ReceivedBurst(
+            bits=np.asarray(bits * detected[..., None], dtype=np.uint8),
+            snr=snr[..., data],
+            channel=h * detected[..., None, None, None],
+            noise_variance=noise,
+            detected=detected,
+        )
 
 
 def _whole(values: ComplexArray) -> FloatArray:

@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,11 @@ from .pilot_pattern import PilotPattern
 
 MAX_SNR = 1e6
 """Ceiling of the estimated SNR (60 dB)."""
+
+EstimatorTables: TypeAlias = tuple[
+    FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray
+]
+"""Levels of the grid, eigenvalues, eigenvectors, shrinkage, penalty and rows of an estimator."""
 
 _LEVELS = 10.0 ** (np.arange(-20, 61) / 10)
 _LEAST_DOPPLER = 1e-6
@@ -149,14 +155,21 @@ class WienerEstimator:
         )
         return out
 
-    def mean_error(self, level: PilotLevel) -> FloatArray:
-        """Mean over transmit antennas of `error_variance` at a level, float64 [..., symbols]."""
-        return np.asarray(self._mean_errors[level.step])
-
     @cached_property
-    def _mean_errors(self) -> FloatArray:
-        """Of every level on the grid, float64 [levels, symbols]."""
-        return np.asarray(self.error_variance(_LEVELS).mean(axis=-2))
+    def tables(self) -> tuple[EstimatorTables, FloatArray]:
+        """What `rail_signals.train_radio.reception.receive_bursts` takes of an estimator.
+
+        The mean over transmit antennas of `error_variance` is that of every level on the grid.
+        """
+        known = (
+            _LEVELS,
+            self._values,
+            self._vectors,
+            self._shrink,
+            self._penalty,
+            self._rows,
+        )
+        return known, np.ascontiguousarray(self.error_variance(_LEVELS).mean(axis=-2))
 
     def error_variance(self, snr: ArrayLike) -> FloatArray:
         """Predicted error variance of `estimate` as a fraction of the channel power.

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rail_signals.arrays import ComplexArray
+from rail_signals.arrays import BoolArray, ComplexArray
+from rail_signals.compiled import compiled
 
 from .burst import RadioBurstFormat
 from .symbol_mapping import BitArray
 
 BEACON_SLOT = 0
+_AT_ONCE, _SIGN = 256, np.uint64(1)
 
 
 @dataclass(frozen=True)
@@ -71,10 +73,13 @@ class RadioSlots:
             )
         return self.burst.transmit(bits_of(frames))
 
-    def block(self, frames: Mapping[int, bytes]) -> ComplexArray:
+    def block(self, frames: Mapping[int, bytes], amplitude: float = 1.0) -> ComplexArray:
         """Block with a frame in each slot named, zero elsewhere; complex128 [tx, samples]."""
+        # Of a block for many trains most is zero: memory that is not touched costs nothing.
         wave = np.zeros((self.burst.scheme.transmit, self.samples), dtype=np.complex128)
-        for slot, burst in zip(frames, self.bursts(list(frames.values())), strict=True):
+        bursts = self.bursts(list(frames.values()))
+        bursts *= amplitude
+        for slot, burst in zip(frames, bursts, strict=True):
             first, end = self.span(slot)
             wave[:, first:end] = burst
         return wave
@@ -83,6 +88,41 @@ class RadioSlots:
         """Slots of received samples [rx, slots * burst], as a view [slot, rx, burst]."""
         parts = samples.reshape(samples.shape[0], -1, self.burst.samples)
         return np.asarray(parts.transpose(1, 0, 2))
+
+
+def used_slots(samples: ComplexArray, length: int) -> list[int]:
+    """Whole slots of a length in a block [antenna, sample] that are not zero altogether.
+
+    Examples
+    --------
+    >>> used_slots(np.array([[0, 0, 0, 1j, 0, 0, 1], [0, 1, 0, 0, 0, 0, 0]]), 2)
+    [0, 1]
+    """
+    words = np.ascontiguousarray(samples, dtype=np.complex128).view(np.uint64)
+    used = np.empty(samples.shape[1] // length, dtype=np.bool_)
+    _look_for_signals(words, 2 * length, used)
+    return [slot for slot, some in enumerate(used.tolist()) if some]
+
+
+@compiled
+def _look_for_signals(words: NDArray[np.uint64], length: int, used: BoolArray) -> None:
+    """Whether stretches of numbers, as they are kept [antenna, number], hold anything but zeros.
+
+    ``used`` is the result.
+    """
+    for slot in range(len(used)):
+        used[slot] = False
+        for antenna in range(len(words)):
+            # By the hundred: a loop that may end at every step looks at one after the other.
+            for start in range(slot * length, (slot + 1) * length, _AT_ONCE):
+                some = np.uint64(0)
+                for word in words[antenna, start : min(start + _AT_ONCE, (slot + 1) * length)]:
+                    some |= word << _SIGN  # zero has two signs
+                if some != 0:
+                    used[slot] = True
+                    break
+            if used[slot]:
+                break
 
 
 def bits_of(frames: Sequence[bytes]) -> BitArray:

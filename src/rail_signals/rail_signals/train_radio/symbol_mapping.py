@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,15 +81,8 @@ class Constellation:
                 f"bits must have whole symbols of {self.bits_per_symbol} on their last axis,"
                 f" got shape {values.shape}"
             )
-        if values.dtype == np.uint8:
-            sound = not values.size or values.max() <= 1
-        else:
-            sound = values.dtype == np.bool_ or bool(((values == 0) | (values == 1)).all())
-        if not sound:
-            wrong = values[(values != 0) & (values != 1)]
-            raise ValueError(f"bits must be 0 or 1, got {wrong.flat[0]!r}")
         count = values.shape[-1] // self.bits_per_symbol
-        groups = values.astype(np.uint8).reshape(*values.shape[:-1], count, self.bits_per_symbol)
+        groups = check_bits(values).reshape(*values.shape[:-1], count, self.bits_per_symbol)
         labels = groups[..., 0]
         for i in range(1, self.bits_per_symbol):
             labels = 2 * labels + groups[..., i]
@@ -127,6 +120,24 @@ class Constellation:
         energy = {1: 1, 2: 2, 4: 10}[self.bits_per_symbol]
         sized = (1.0 - 2 * bits[:, 0]) / math.sqrt(energy)
         return np.asarray(sized * (1 + 2 * bits[:, 1]) if bits.shape[1] == 2 else sized)
+
+
+def check_bits(values: NDArray[Any]) -> BitArray:
+    """The same as uint8.
+
+    Raises
+    ------
+    ValueError
+        If a value is neither 0 nor 1.
+    """
+    if values.dtype == np.uint8:
+        sound = not values.size or values.max() <= 1
+    else:
+        sound = values.dtype == np.bool_ or bool(((values == 0) | (values == 1)).all())
+    if not sound:
+        wrong = values[(values != 0) & (values != 1)]
+        raise ValueError(f"bits must be 0 or 1, got {wrong.flat[0]!r}")
+    return np.ascontiguousarray(values, dtype=np.uint8)
 
 
 _CONSTELLATIONS: Final = {

@@ -23,6 +23,7 @@ from .train_bounds import Trouble
 
 #: By so much another train's signal, 30 dB below, moves a range without being noticed [m].
 _UNSEEN_M = 1.5
+_DOUBTFUL = frozenset({Trouble.RANGE, Trouble.RANGE_SEGMENT, Trouble.LEAP})
 
 
 @dataclass
@@ -118,8 +119,7 @@ class AuthorityIssuer:
         sigma_m = sqrt(variance_m2) + _UNSEEN_M / self._sigmas
         accepted = self._block.ranged(number, time_s, segment, position_m, sigma_m)
         # A range that contradicts what the train reports is nothing to tell it.
-        doubtful = {Trouble.RANGE, Trouble.RANGE_SEGMENT, Trouble.LEAP}
-        if accepted and not doubtful.intersection(self._block.troubles(number)):
+        if accepted and not _DOUBTFUL.intersection(self._block.troubles(number)):
             caller.place = time_s, position_m, self._sigmas * sigma_m
 
     def telegrams(self, time_ns: int) -> dict[str, list[tuple[int, bytes]]]:

@@ -36,7 +36,7 @@ from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
 from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
 from rail_signals.arrays import ComplexArray
 from rail_signals.train_radio.burst import RadioBurstReceiver
-from rail_signals.train_radio.slots import BEACON_SLOT, frame_of
+from rail_signals.train_radio.slots import BEACON_SLOT, frame_of, used_slots
 
 BEACON = bytes(range(FRAME_BYTES))
 """What the beacon carries: trains look at how well it arrives, not at what it says."""
@@ -68,7 +68,7 @@ class CbtcBaseStationNode(
         self._receiver = RadioBurstReceiver(self._slots.burst)
         # Waves of mean power 1 mW need an energy per symbol of as many samples.
         self._amplitude = 10.0 ** (p.power_dbm / 20.0) * p.samples_per_symbol**0.5
-        self._beacon = self._slots.bursts([BEACON])[0]
+        self._beacon = self._slots.bursts([BEACON])[0] * self._amplitude
         self._radio = (
             self._slots.burst.sample_rate_hz,
             p.downlink_carrier_hz,
@@ -92,10 +92,10 @@ class CbtcBaseStationNode(
             self._send(self._silence.at(stamp_ns))
             return
         ordered = items.get(self._telegrams)
-        block = self._slots.block(ordered.newest(self._p.trains) if ordered else {})
+        frames = ordered.newest(self._p.trains) if ordered else {}
+        block = self._slots.block(frames, self._amplitude)
         first, end = self._slots.span(BEACON_SLOT)
         block[:, first:end] = self._beacon
-        block *= self._amplitude
         self._send(Waveform(stamp_ns, *self._radio, block))
 
     def _on_block(self, stamp_ns: int, received: ComplexArray | None) -> None:
@@ -105,8 +105,9 @@ class CbtcBaseStationNode(
         frames: list[tuple[int, bytes]] = []
         if self.switched_on:
             # Where a scheme sends by two antennas and receives by one, that is the first.
-            cut = self._slots.cut(received[: self._slots.burst.scheme.receive])
-            used = [slot for slot in range(1, len(cut)) if cut[slot, 0, 0] or cut[slot].any()]
+            heard = received[: self._slots.burst.scheme.receive]
+            cut = self._slots.cut(heard)
+            used = [slot for slot in used_slots(heard, self._slots.burst.samples) if slot]
             bursts = self._receiver.receive(cut[used], doppler_hz=self._p.doppler_hz)
             frames = [
                 (slot, frame_of(bits))

@@ -43,13 +43,22 @@ _OFFSET_STREAM = 22
 _LEAST_M = 1.0
 
 
+#: Fraction of the power beside its strongest line that a tone has by rounding alone.
+_NO_OTHER_LINE = 1e-20
+
+
 @dataclass(frozen=True)
 class _TransmittedTone:
-    """A block that a station sends, its transform and the mean frequency of its envelope [Hz]."""
+    """A block that a station sends, its transform and the mean frequency of its envelope [Hz].
+
+    Of a `line`, an envelope of one frequency with whole periods in the block, nothing but the
+    phase is delayed.
+    """
 
     samples: ComplexArray
     spectrum: ComplexArray
     mean_hz: float
+    line: bool
 
 
 class ReferenceMedium:
@@ -171,20 +180,25 @@ class ReferenceMedium:
         heard: NDArray[np.complex64],
     ) -> None:
         """Add what arrives over links [link] to the rows of ``heard`` [row, sample]."""
-        tones = [self._sent(index, sent[index]) for index in station.tolist()]
-        middle_m = distance_m[:, self.description.samples // 2]
-        envelope = delayed(
-            np.array([tone.spectrum for tone in tones]),
-            middle_m / SPEED_OF_LIGHT_M_PER_S,
-            self.description.sample_rate_hz,
-        )
-        turns = np.empty((len(tones), 3))
+        indices = station.tolist()
+        tones = {index: self._sent(index, sent[index]) for index in set(indices)}
+        turns = np.zeros((len(indices), 4))
         turns[:, 0] = offset_hz
         turns[:, 1] = self.description.carrier_hz / SPEED_OF_LIGHT_M_PER_S
-        turns[:, 2] = [tone.mean_hz / SPEED_OF_LIGHT_M_PER_S for tone in tones]
+        turns[:, 2] = [tones[index].mean_hz / SPEED_OF_LIGHT_M_PER_S for index in indices]
+        lines = {index: number for number, index in enumerate(tones) if tones[index].line}
+        envelopes = [tone.samples for tone in tones.values()]
+        source = np.array([lines.get(index, -1) for index in indices], dtype=np.int64)
+        others = np.flatnonzero(source < 0)
+        if others.size:
+            turns[others, 3] = middle_m = distance_m[others, self.description.samples // 2]
+            source[others] = len(envelopes) + np.arange(others.size)
+            spectra = np.array([tones[indices[link]].spectrum for link in others.tolist()])
+            delay_s = middle_m / SPEED_OF_LIGHT_M_PER_S
+            envelopes.extend(delayed(spectra, delay_s, self.description.sample_rate_hz))
         add_tones(
-            *(row, turns, self._time_s, distance_m, self._amplitude(distance_m)),
-            envelope.view(np.float64),
+            *(row, source, turns, self._time_s, distance_m, self._amplitude(distance_m)),
+            np.array(envelopes).view(np.float64),
             heard.view(np.float32),
         )
 
@@ -199,5 +213,7 @@ class ReferenceMedium:
             power = np.abs(spectrum) ** 2
             total = float(power.sum())
             mean_hz = float(power @ self._frequencies_hz) / total if total else 0.0
-            known = self._known[station] = _TransmittedTone(samples, spectrum, mean_hz)
+            power[power.argmax()] = 0.0
+            line = bool(power.sum() < _NO_OTHER_LINE * total)
+            known = self._known[station] = _TransmittedTone(samples, spectrum, mean_hz, line)
         return known

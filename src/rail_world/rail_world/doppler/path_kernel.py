@@ -48,7 +48,14 @@ def distances(ways: Any, stations: Any, time_s: Any, least_m: Any, out: Any) -> 
 
 @compiled
 def add_tones(
-    rows: Any, turns: Any, time_s: Any, distance_m: Any, amplitude: Any, envelope: Any, heard: Any
+    rows: Any,
+    sources: Any,
+    turns: Any,
+    time_s: Any,
+    distance_m: Any,
+    amplitude: Any,
+    envelope: Any,
+    heard: Any,
 ) -> None:
     """Add the envelopes of all links, turned by their ways, to what the trains hear.
 
@@ -56,11 +63,14 @@ def add_tones(
     ----------
     rows : int64 [link]
         Row of ``heard``.
-    turns : float64 [link, 3]
-        Offset [Hz], turns of the carrier and of the mean of the envelope in a metre.
+    sources : int64 [link]
+        Row of ``envelope``.
+    turns : float64 [link, 4]
+        Offset [Hz], turns of the carrier and of the mean of the envelope in a metre, and the way
+        that the envelope is delayed by already.
     time_s : float64 [sample]
     distance_m, amplitude : float64 [link, sample]
-    envelope : float64 [link, 2 sample]
+    envelope : float64 [source, 2 sample]
         Real and imaginary parts in turn.
     heard : float32 [row, 2 sample]
     """
@@ -69,14 +79,14 @@ def add_tones(
     for link in range(len(rows)):
         row, offset_hz = rows[link], turns[link, 0]
         carrier_per_m, envelope_per_m = turns[link, 1], turns[link, 2]
-        middle_m = distance_m[link, samples // 2]
+        delayed_m, parts = turns[link, 3], envelope[sources[link]]
         for i in range(samples):
             away_m = distance_m[link, i]
             turned = offset_hz * time_s[i] - carrier_per_m * away_m
-            turned -= envelope_per_m * (away_m - middle_m)
+            turned -= envelope_per_m * (away_m - delayed_m)
             cosine[i], sine[i] = phasor_of_turns(turned)
         for i in range(samples):
-            x = amplitude[link, i] * envelope[link, 2 * i]
-            y = amplitude[link, i] * envelope[link, 2 * i + 1]
+            x = amplitude[link, i] * parts[2 * i]
+            y = amplitude[link, i] * parts[2 * i + 1]
             heard[row, 2 * i] += x * cosine[i] - y * sine[i]
             heard[row, 2 * i + 1] += x * sine[i] + y * cosine[i]

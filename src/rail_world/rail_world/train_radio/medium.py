@@ -189,19 +189,20 @@ class CbtcMedium:
             If a burst or a window does not fit the tick or the antennas, or bursts of a sender
             overlap or are not in order.
         """
-        alive = self._alive(links)
+        alive = self._alive(links).tolist()
+        noise_mw = {channel: self._noise_mw(links, channel) for channel in set(self._channel)}
+        # Of all pairs of a mast and a train few are near each other.
+        near: dict[tuple[int, int], list[int]] = {}
+        for train, base in np.argwhere(links.in_coverage.T).tolist():
+            near.setdefault((train, self._channel[base]), []).append(base)
         ports: dict[tuple[int, int], _Port] = {}
-        for (train, channel), spans in windows.items():
-            near = [
-                base
-                for base in np.flatnonzero(links.in_coverage[:, train]).tolist()
-                if self._channel[base] == channel
-            ]
-            if near:
-                received = [base for base in near if alive[base] and base in sent]
-                ports[train, channel] = _Port(
+        for key, spans in windows.items():
+            if key in near:
+                train, channel = key
+                received = [base for base in near[key] if alive[base] and base in sent]
+                ports[key] = _Port(
                     train * _MOST_CHANNELS + channel,
-                    self._noise_mw(links, channel),
+                    noise_mw[channel],
                     spans,
                     tuple((base, train, sent[base]) for base in received),
                 )

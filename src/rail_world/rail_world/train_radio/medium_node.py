@@ -23,6 +23,7 @@ from rail_msgs_py.topics.train_radio import (
     CBTC_TRAIN_TX,
 )
 from rail_msgs_py.waveform import RepeatedBlock, Waveform, silence
+from rail_signals.train_radio.slots import used_slots
 from rail_world.medium_node import MediumNode, MediumParameters
 
 from .description import CbtcDescription
@@ -96,9 +97,7 @@ class CbtcMediumNode(MediumNode[CbtcMediumParameters], name="cbtc_medium", names
         length = self._p.burst_samples
         sent = {}
         for base, block in blocks.items():
-            slots = block.shape[1] // length
-            used = block[:, : slots * length].reshape(len(block), slots, length).any(axis=(0, 2))
-            spans = map(self._span, np.flatnonzero(used).tolist())
+            spans = map(self._span, used_slots(block, length))
             antennas = self._radio.base_antennas
             sent[base] = [_burst(first, block[:, first:end], antennas) for first, end in spans]
         received = self._medium.downlink(links, sent, self._windows)

@@ -19,6 +19,8 @@ from rail_corridor.scenario.model import Scenario
 
 #: Stations and trains of the rows `corridor.scale_*`.
 SCALES = ((10, 5), (30, 5), (114, 1), (114, 5), (114, 10), (114, 20))
+#: Trains of the rows `corridor.located`: ranging, train radio, Doppler and localizer, 114 stations.
+LOCATED_TRAINS = (5, 20, 50, 100)
 ZONE_M = 200.0
 
 
@@ -29,16 +31,24 @@ def rows(names: tuple[str, ...] = ()) -> Iterator[dict[str, Any]]:
         cases.append(
             (f"corridor.scale_{stations}_stations_{trains}_trains", line(stations, trains))
         )
+    for trains in LOCATED_TRAINS:
+        cases.append((f"corridor.located_{trains}_trains", line(114, trains, located=True)))
     for name, scenario in cases:
         if not names or any(name == n or name.startswith(n) for n in names):
             yield _row(name, scenario)
 
 
-def line(stations: int, trains: int, seconds: float = 30.0) -> Scenario:
-    """A straight line with trains spread over it, all running: nobody enters or leaves."""
+def line(stations: int, trains: int, *, located: bool = False, seconds: float = 30.0) -> Scenario:
+    """A straight line with trains spread over it, all running: nobody enters or leaves.
+
+    With ``located`` the trains go by moving block, each with four ways to know where it is.
+    """
     length_m = stations * ZONE_M
+    radio = {"base_spacing_m": 1000.0, "symbol_rate_hz": 200e3}
+    equipment = {"cbtc": radio, "references": {"spacing_m": 600.0}, "localizer": {}}
     return scenario_from_data(
         {
+            **(equipment if located else {}),
             "name": "scale",
             "seed": 3,
             "duration_s": seconds,

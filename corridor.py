@@ -192,6 +192,7 @@ def compile_what_runs() -> None:
         ".".join(path.relative_to(ROOT / "src").with_suffix("").parts[1:])
         for path in (ROOT / "src").glob("*/*/**/*.py")
     )
+    names += ["numba", "rosidl_generator_py"]  # imported by the first kernel, and the first node
     code = (
         "import contextlib, importlib, sys\n"
         "for name in sys.argv[1:]:\n"

@@ -21,6 +21,26 @@ if TYPE_CHECKING:
 MOST_NODES_WITH_SERVICES = 24
 
 
+def load_for_nodes(kinds: Iterable[str]) -> None:
+    """Load what nodes of some kinds need, once for all processes that are forked after it.
+
+    Of each process by itself it would take half a second.
+    """
+    from rcl_interfaces.msg import ParameterEvent
+    from rclpy.type_support import check_for_type_support
+
+    from rail_msgs_py.topics.tick import TOPICS
+
+    for kind in kinds:
+        node_kinds()[kind].load()
+    for message in (ParameterEvent, *(topic.type for topic in TOPICS)):
+        check_for_type_support(message)
+    preload_kernels()
+    # The collector does not look through it again, nor make each process its own copy of it.
+    gc.collect()
+    gc.freeze()
+
+
 def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:
     """Create a node; equipment is switched on."""
     namespace, _, name = spec.name.rpartition("/")
@@ -55,7 +75,6 @@ def make_nodes(
         if until():
             break
         nodes.append(make_node(spec, context, services))
-    preload_kernels()
     gc.collect()
     gc.freeze()
     return nodes

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
-from rail_corridor.equipment.registry import node_kinds
 from rail_corridor.loading.scenario_files import files_of
 from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.middleware.domain import sole_corridor
@@ -34,7 +33,7 @@ from rail_corridor.scenario.model import Scenario
 
 from .external_traffic import FULL_NAME as EXTERNAL_TRAFFIC
 from .external_traffic import ExternalTrafficRecorder
-from .host import destroy_nodes, make_context, make_nodes, run_nodes
+from .host import destroy_nodes, load_for_nodes, make_context, make_nodes, run_nodes
 from .kernels import compile_before_the_first_run
 from .kills import FaultInjector, check_kills, killed_nodes
 from .options import RunOptions, check_recording, default_placement
@@ -130,9 +129,7 @@ class _LaunchedRun:
         self._stop: Any = None
 
     def run(self) -> int:
-        for specs in self._groups.values():
-            for kind in {spec.kind for spec in specs}:
-                node_kinds()[kind].load()
+        load_for_nodes({spec.kind for specs in self._groups.values() for spec in specs})
         nodes = sum(len(specs) for specs in self._groups.values())
         if self._options.record is not None:
             self._recording = self._record(self._options.record, nodes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -57,7 +58,7 @@ def test_listeners_that_come_and_go_change_nothing_and_miss_nothing(
 ) -> None:
     path = rail.directory / "report.json"
     visits = [Visits(listener, topic, parts) for topic, parts in _TOPICS]
-    run = rail.start(*_RUN, "--rate", 8, "--report", path)
+    run = rail.start(*_RUN, "--rate", 16, "--report", path)
 
     def over() -> bool:
         for each in visits:
@@ -90,4 +91,5 @@ def test_who_joins_a_process_hears_the_tick_at_hand_and_the_health_of_all(
     listener.until(lambda: nodes <= {status.hardware_id for m in health for status in m.status})
     said_s = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in health]
     assert joined_s - 0.1 < said_s[0] < joined_s + 3.0
-    assert rail.finish(run) == 0
+    run.send_signal(signal.SIGINT)
+    assert rail.finish(run) == 128 + signal.SIGINT

@@ -36,6 +36,7 @@ def test_topics_echo_and_hz_of_a_running_corridor(
     echoes = {topic: rail.start("echo", topic, "--once") for topic in ECHOES}
     raw = rail.start("echo", "/wayside/wrs1/zone1/range", "--once", "--raw")
     listed = rail.start("topics")
+    nobody = rail.start("echo", "/nobody", "--once")
     rate = rail.start("hz", "/clock")
     for topic, pattern in ECHOES.items():
         assert rail.finish(echoes[topic]) == 0, rail.errors(echoes[topic])
@@ -44,16 +45,12 @@ def test_topics_echo_and_hz_of_a_running_corridor(
     assert re.search(r"radiation_type: 255\n.*\nmin_range: ", rail.output(raw))
     assert rail.finish(listed) == 0
     assert "/wayside/wrs1/zone1/tx" in rail.output(listed)
+    assert rail.finish(nobody) == 1
+    assert rail.output(nobody) == ""
+    assert rail.errors(nobody).count("\n") == 1
+    assert "/nobody: nobody publishes it" in rail.errors(nobody)
     wait_until(lambda: "10.0 Hz of simulated time" in rail.output(rate))
     rate.send_signal(signal.SIGINT)
     assert rail.finish(rate) == 0
     run.send_signal(signal.SIGINT)
     assert rail.finish(run) == 128 + signal.SIGINT
-
-
-def test_a_topic_that_nobody_publishes_is_one_line(rail: Rail) -> None:
-    echo = rail.start("echo", "/nobody", "--once")
-    assert rail.finish(echo) == 1
-    assert rail.output(echo) == ""
-    assert rail.errors(echo).count("\n") == 1
-    assert "/nobody: nobody publishes it" in rail.errors(echo)

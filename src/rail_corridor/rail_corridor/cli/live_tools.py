@@ -65,27 +65,35 @@ def _when(node: Node, condition: Callable[[], bool], limit_s: float) -> bool:
     return condition()
 
 
+class _Graph:
+    """Topics of a corridor, as they become known."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.topics: dict[str, list[str]] = {}
+        self._since_s = time.monotonic()
+
+    def is_settled(self) -> bool:
+        """Look again: whether there is a corridor, and nothing new for a while."""
+        before = len(self.topics)
+        self.topics = dict(self._node.get_topic_names_and_types())
+        if len(self.topics) != before:
+            self._since_s = time.monotonic()
+        there = STATE.name() in self.topics  # the clock may be somebody else's
+        return there and time.monotonic() - self._since_s > SETTLED_S
+
+
 def list_topics() -> int:
     """Show the topics of the running corridor; returns the exit code."""
     console = Console()
     with _node("rail_topics") as node:
-        known: dict[str, list[str]] = {}
-        settled = {"count": -1, "since": time.monotonic()}
-
-        def is_settled() -> bool:
-            known.clear()
-            known.update(dict(node.get_topic_names_and_types()))
-            if len(known) != settled["count"]:
-                settled.update(count=len(known), since=time.monotonic())
-            matches = STATE.name() in known  # the clock may be somebody else's
-            return matches and time.monotonic() - settled["since"] > SETTLED_S
-
-        if not _when(node, is_settled, DISCOVERY_S):
+        known = _Graph(node)
+        if not _when(node, known.is_settled, DISCOVERY_S):
             console.print("no corridor is running on this host and ROS_DOMAIN_ID")
             return 1
     rows = [
         (name, ", ".join(types), kind.text)
-        for name, types in sorted(known.items())
+        for name, types in sorted(known.topics.items())
         if (kind := kind_of(name)) is not None
     ]
     # One line each, whatever the width of the terminal: for grep as well as for the eye.
@@ -99,14 +107,15 @@ def list_topics() -> int:
 
 def _find(node: Node, topic: str) -> Any:
     """Message class of a topic, None if nobody publishes it."""
-    matches: list[str] = []
+    graph = _Graph(node)
 
-    def look() -> bool:
-        matches[:] = dict(node.get_topic_names_and_types()).get(topic, [])
-        return bool(matches) and node.count_publishers(topic) > 0
+    def published() -> bool:
+        return topic in graph.topics and node.count_publishers(topic) > 0
 
-    if not _when(node, look, DISCOVERY_S):
+    _when(node, lambda: graph.is_settled() or published(), DISCOVERY_S)
+    if not published():
         return None
+    matches = graph.topics[topic]
     package, _, name = matches[0].partition("/msg/")
     return getattr(importlib.import_module(f"{package}.msg"), name)
 

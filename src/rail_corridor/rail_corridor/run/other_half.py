@@ -28,7 +28,8 @@ class OtherHalf:
     def look(self, node: Any) -> bool:
         """Look, now and then, through the eyes of a node: whether it is found gone just now."""
         now_s = node.steady_s()
-        if self.gone or now_s - self._looked_s < _LOOK_S:
+        # Until it has been seen, at every chance: it may be gone right after that.
+        if self.gone or (self._seen and now_s - self._looked_s < _LOOK_S):
             return False
         self._looked_s = now_s
         names = (f"{space.rstrip('/')}/{n}" for n, space in node.get_node_names_and_namespaces())

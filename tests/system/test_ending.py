@@ -122,7 +122,7 @@ def test_the_halves_of_a_corridor_end_together(
     rail: Rail, listener: Listener, first: str, second: str, number: signal.Signals, code: int
 ) -> None:
     clock = listener.listen(CLOCK)
-    arguments = ("run", "branch", "--rate", 2, "--processes", "site", "--only")
+    arguments = ("run", "branch", "--rate", 2, "--processes", "site", "--timeout", 2, "--only")
     halves = {part: rail.start(*arguments, part) for part in (first, second)}
     # Each half looks for the other twice a second.
     listener.until(lambda: len(clock) > 30)

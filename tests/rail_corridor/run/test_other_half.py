@@ -32,3 +32,17 @@ def test_it_is_gone_once_it_has_been_there_and_none_of_its_nodes_is_left() -> No
     assert half.look(eyes)
     assert half.gone
     assert not half.look(eyes)  # it is told once
+
+
+def test_it_is_gone_once_all_its_nodes_have_failed_though_the_graph_still_has_them() -> None:
+    half, eyes = OtherHalf({"/train_a/vrs", "/train_b/vrs"}), Eyes()
+    eyes.names = [("vrs", "/train_a"), ("vrs", "/train_b")]
+    assert not half.look(eyes)
+    assert not half.look(eyes, ["/train_b/vrs", "/wayside/wrs1"])
+    assert half.look(eyes, ["/train_b/vrs", "/wayside/wrs1", "/train_a/vrs"])
+
+
+def test_one_that_never_came_is_not_gone() -> None:
+    half, eyes = OtherHalf({"/train_a/vrs"}), Eyes()
+    assert not half.look(eyes, ["/train_a/vrs"])
+    assert not half.gone

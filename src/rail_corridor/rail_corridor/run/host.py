@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: With more nodes than this in a process the services are left out until somebody asks for them.
 MOST_NODES_WITH_SERVICES = 24
+#: Wall time for a process to end in order once its launcher has gone.
+_ORPHANED_S = 3.0
 
 
 def load_for_nodes(kinds: Iterable[str]) -> None:
@@ -138,10 +140,16 @@ def make_context(tap: Tap | None, report_reads: frozenset[str] = frozenset()) ->
 
 
 def die_with(lifeline: int) -> None:
-    """End this process when the other end of a pipe closes, however the launcher ended."""
+    """End this process when the other end of a pipe closes, however the launcher ended.
+
+    If that was a kill, the middleware may wait for a lock that it held (Fast DDS issue 6485): then
+    this one goes without taking leave.
+    """
 
     def watch() -> None:
         os.read(lifeline, 1)
         os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(_ORPHANED_S)
+        os.kill(os.getpid(), signal.SIGKILL)
 
     threading.Thread(target=watch, daemon=True).start()

@@ -324,7 +324,8 @@ class _LaunchedRun:
 
     def _look_for_the_other_half(self) -> None:
         """End with the other half of the corridor."""
-        if self._other_half.look(self._observer):
+        failed = [failure["node"] for failure in self._observer.failures]
+        if self._other_half.look(self._observer, failed):
             other = "onboard" if self._options.only == "wayside" else "wayside"
             line = f"the other half of the corridor, {other}, has ended: so does this one"
             self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)

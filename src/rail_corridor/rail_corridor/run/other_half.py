@@ -25,15 +25,21 @@ class OtherHalf:
         #: Whether it has been there and is no longer.
         self.gone = False
 
-    def look(self, node: Any) -> bool:
-        """Look, now and then, through the eyes of a node: whether it is found gone just now."""
+    def look(self, node: Any, failed: Collection[str] = ()) -> bool:
+        """Look, now and then, through the eyes of a node: whether it is found gone just now.
+
+        One whose nodes have all ``failed`` is gone as well: of a process that was killed the graph
+        tells for another 20 s, of one that hangs for ever.
+        """
         now_s = node.steady_s()
         # Until it has been seen, at every chance: it may be gone right after that.
         if self.gone or (self._seen and now_s - self._looked_s < _LOOK_S):
             return False
         self._looked_s = now_s
         names = (f"{space.rstrip('/')}/{n}" for n, space in node.get_node_names_and_namespaces())
-        if not self._nodes.isdisjoint(names):
+        if self._nodes <= {*failed}:
+            self.gone = self._seen
+        elif not self._nodes.isdisjoint(names):
             self._seen = True
         elif self._seen:
             self.gone = True

@@ -66,7 +66,7 @@ def test_a_station_killed_in_the_one_process_comes_back_in_one_of_its_own(
     assert rail.finish(rail.start("plan", *changed, "--write", written)) == 0
     failed = listener.listen(FAILED)
     run = rail.start(
-        *("run", *changed, "--processes", "one", "--rate", 3),
+        *("run", *changed, "--processes", "one", "--rate", 2),
         *("--kill", "/wayside/wrs3@0.5", "--report", path),
     )
     listener.until(lambda: failed)

@@ -27,8 +27,9 @@ def test_a_report_that_stands_still_for_a_hundred_ticks_misses_none(
 ) -> None:
     path = rail.directory / "report.json"
     clock, observed = listener.listen(CLOCK), listener.listen(OBSERVED)
-    # Paced, so that the report stops long before the end.
-    run = rail.start(*("run", *_RUN), "--rate", 6, "--processes", "site", "--report", path)
+    # Paced, so that the report stops long before the end; stopped for less than the second after
+    # which Fast DDS gives up a port in shared memory.
+    run = rail.start(*("run", *_RUN), "--rate", 15, "--processes", "site", "--report", path)
     listener.until(lambda: len(observed) > 1)
     os.kill(run.pid, signal.SIGSTOP)
     stopped = len(clock)

@@ -248,10 +248,11 @@ def run_checks(pytest_arguments: list[str]) -> int:
             print(f"== {name}", flush=True)
             if subprocess.run(command, cwd=ROOT, env=env, check=False).returncode:
                 failed.append(name)
-        # Tests marked `system` come in two groups, each on one worker (tests/conftest.py).
+        # Tests marked `system` come in two groups, each on one worker (tests/conftest.py), and wait
+        # for much of their time: a third worker has the rest.
         # A test that hangs below Python ends with its worker, and its stack is printed.
         limit = ["--timeout", "300", "--timeout-method", "thread"]
-        pytest_arguments = ["-n", "2", "--dist", "loadgroup", *limit, "-q"]
+        pytest_arguments = ["-n", "3", "--dist", "loadgroup", *limit, "-q"]
     print("== pytest", flush=True)
     command = [python, "-m", "pytest", *pytest_arguments]
     code = subprocess.run(command, cwd=ROOT, env=env, check=False).returncode

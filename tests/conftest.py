@@ -64,7 +64,7 @@ def module_domain() -> Iterator[int]:
         yield domain
 
 
-_ONLY_RUN = {
+_SECOND_GROUP = {
     "test_positions_on_board",
     *("test_kill_campaign", "test_track_codes", "test_train_radio", "test_placement"),
     *("test_hostile_network", "test_train_bus", "test_axle_counter"),
@@ -78,5 +78,5 @@ def pytest_itemcollected(item: pytest.Item) -> None:
     Those that look at the wall clock are in the first; the second waits for what a run does.
     """
     if item.get_closest_marker("system"):
-        calm = item.path.stem in _ONLY_RUN
-        item.add_marker(pytest.mark.xdist_group("system_runs" if calm else "system"))
+        second = item.path.stem in _SECOND_GROUP
+        item.add_marker(pytest.mark.xdist_group("system_runs" if second else "system"))

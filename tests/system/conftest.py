@@ -24,24 +24,16 @@ from rail_corridor.recording.mcap_file import RecordingFile
 from rail_corridor.report.from_recording import report_of
 from rail_msgs_py.topics.topic import Topic
 
+from .waiting import PATIENCE_S, until
+
 ROOT = Path(__file__).resolve().parents[2]
-#: Generous: it only makes a test fail that would otherwise hang.
-PATIENCE_S = 90.0
 _TOKEN = "RAIL_TEST_TOKEN"
 
 
 @pytest.fixture
 def wait_until() -> Callable[[Callable[[], Any]], Any]:
     """Return a function that waits for a condition and returns early; it fails after long."""
-
-    def wait(condition: Callable[[], Any]) -> Any:
-        deadline_s = time.monotonic() + PATIENCE_S
-        while not (value := condition()):
-            assert time.monotonic() < deadline_s, f"waited {PATIENCE_S} s in vain"
-            time.sleep(0.01)
-        return value
-
-    return wait
+    return until
 
 
 def _segments_of(processes: Iterable[int]) -> set[Path]:

@@ -11,9 +11,9 @@ import re
 import signal
 import subprocess
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.error import HTTPError
@@ -22,6 +22,7 @@ from urllib.request import Request, urlopen
 
 import pytest
 
+from . import waiting
 from .browser import Browser, find_browser
 
 if TYPE_CHECKING:
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.system
 
-PATIENCE_S = 90.0
 #: Between two looks; each costs the viewer an answer.
 _LOOK_S = 0.1
+until = partial(waiting.until, look_s=_LOOK_S)
 
 
 @dataclass(frozen=True)
@@ -56,15 +57,6 @@ class View:
                 return dict(json.load(answer))
         except HTTPError as error:
             return {"status": error.code, **json.load(error)}
-
-
-def until(condition: Callable[[], Any]) -> Any:
-    """Wait for a condition and return early; fail after long."""
-    deadline_s = time.monotonic() + PATIENCE_S
-    while not (value := condition()):
-        assert time.monotonic() < deadline_s, f"waited {PATIENCE_S} s in vain"
-        time.sleep(_LOOK_S)
-    return value
 
 
 @pytest.fixture(scope="module")

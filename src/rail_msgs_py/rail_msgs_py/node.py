@@ -72,7 +72,7 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         return getattr(self.context, "delivery", None)
 
     def _delivery_of(self, topic: Topic) -> LocalDelivery | None:
-        """Delivery to the readers of a topic that only one node sends."""
+        """Delivery that a topic is read from: none if other processes may send on it too."""
         return None if topic.shared else self._delivery
 
     def name_of(self, topic: Topic, **parts: object) -> str:

@@ -264,13 +264,11 @@ class RepeatedBlock:
 
     def __init__(self, block: Waveform) -> None:
         raw = block.to_cdr()
-        self._first = block
-        self._before = raw[: _PREFIX.size]
-        self._after = raw[_PREFIX.size + 8 :]
-        self._last = RepeatedWaveform(block.stamp_ns, block, self._before, self._after)
+        before, after = raw[: _PREFIX.size], raw[_PREFIX.size + _STAMP.size :]
+        self._last = RepeatedWaveform(block.stamp_ns, block, before, after)
 
     def at(self, stamp_ns: int) -> RepeatedWaveform:
         """Block of the tick at ``stamp_ns``."""
         if self._last.stamp_ns != stamp_ns:
-            self._last = RepeatedWaveform(stamp_ns, self._first, self._before, self._after)
+            self._last = RepeatedWaveform(stamp_ns, *self._last[1:])
         return self._last

@@ -119,9 +119,9 @@ class _LaunchedRun:
         self._world_failed = False
         #: Whether some nodes of this process could not be destroyed in time: it must not tidy up.
         self.nodes_left = False
-        ours = {spec.name for specs in self._groups.values() for spec in specs}
+        self._ours = {spec.name for specs in self._groups.values() for spec in specs}
         # Of the wayside the world, without which nothing goes on.
-        others = {spec.name for spec in plan.nodes} - ours - {*options.external}
+        others = {spec.name for spec in plan.nodes} - self._ours - {*options.external}
         self._other_half = OtherHalf(others & {WORLD} or others)
         self._observer: Any = None
         self._progress: Progress | None = None
@@ -216,8 +216,7 @@ class _LaunchedRun:
         )
         nodes = [self._observer, *here]
         if tap is not None and self._options.with_external_nodes:
-            ours = {spec.name for specs in self._groups.values() for spec in specs}
-            others = [spec.name for spec in self._plan.nodes if spec.name not in ours]
+            others = [spec.name for spec in self._plan.nodes if spec.name not in self._ours]
             from .run_recording import SHARED
 
             recorder = ExternalTrafficRecorder(others, tap.open, SHARED, context=context)

@@ -32,7 +32,8 @@ class Topic:
         Whether a node may wait for its reader before the first tick although it is not a stream: an
         estimate that other equipment acts on.
     shared : bool
-        Whether nodes of several processes send on it. All of it then goes through the middleware.
+        Whether nodes of several processes send on it. It is then read through the middleware, by
+        all but those that know the senders to be in their own process.
     """
 
     pattern: str

@@ -10,20 +10,18 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from rail_corridor.equipment.registry import WORLD, node_kinds, subsystems
-from rail_msgs_py.delivery import LocalDelivery, LocalReader
+from rail_msgs_py.delivery import LocalReader
 from rail_msgs_py.topics.tick import CLOCK
 
 from .attribution import Attribution, Attributor, kind_of, modules_by_file
 from .recorded_calls import CallRecorder, replay_s
-from .recorded_messages import Carried, MessageRecorder
-from .sampler import Sampler, Stack
+from .recorded_messages import Carried, MessageRecorder, fail_aloud
+from .sampler import HANDS_OVER, Sampler, Stack
 from .schedule import Phase, Schedule
 from .transport_floor import MiddlewareLoop, hand_over_s
 
 #: Packages that the callbacks of the report begin in.
 _REPORT: Final = ("rail_corridor.report", "rail_corridor.run_data")
-#: Calls the callbacks of nodes.
-_HANDS_OVER: Final = LocalDelivery.run.__code__
 _ROUNDS: Final = 3
 
 
@@ -60,7 +58,7 @@ class TickProbe:
             self.nodes[kind_of(module, kinds) or kinds.setdefault(module, module)] += 1
         self._attributor = Attributor(kinds, modules)
         self._modules, self._context, self._nodes = modules, context, nodes
-        reader = LocalReader(self, _raise, self._on_clock)
+        reader = LocalReader(self, fail_aloud, self._on_clock)
         context.delivery.read(CLOCK.name(), reader, lambda: None)
 
     def _on_clock(self, _: Any) -> None:
@@ -83,7 +81,7 @@ class TickProbe:
         if phase == "recorded":
             self._messages = MessageRecorder(self._context.delivery, self._nodes)
             self._messages.start()
-            self._calls = CallRecorder(self._modules, _HANDS_OVER, besides=_REPORT)
+            self._calls = CallRecorder(self._modules, HANDS_OVER, besides=_REPORT)
             self._calls.start()
         elif phase == "sampled":
             self.sampler.start()
@@ -154,10 +152,6 @@ class TickProbe:
 def _typical_s(measure_s: Callable[[], float]) -> float:
     measure_s()  # kernels may be compiled for other arrays than those of the run
     return statistics.median(measure_s() for _ in range(_ROUNDS))
-
-
-def _raise(error: Exception) -> None:
-    raise error
 
 
 def kinds_by_module() -> dict[str, str]:

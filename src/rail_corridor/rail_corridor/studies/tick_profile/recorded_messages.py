@@ -66,7 +66,7 @@ class MessageRecorder:
         """Record from now on; the first message is that which begins a tick."""
         for name in self.readers:
             take = self._taker(name)
-            self._delivery.read(name, LocalReader(self, _raise, take, take), lambda: None)
+            self._delivery.read(name, LocalReader(self, fail_aloud, take, take), lambda: None)
         # What nodes of several processes send comes by the middleware alone.
         self._told = {
             name: self._subscriptions[name][0]
@@ -111,7 +111,8 @@ class MessageRecorder:
         return take
 
 
-def _raise(error: Exception) -> None:
+def fail_aloud(error: Exception) -> None:
+    """Let what a reader raises end the run."""
     raise error
 
 

@@ -22,7 +22,8 @@ from rail_msgs_py.delivery import LocalDelivery
 #: Between two samples [s].
 INTERVAL_S: Final = 0.001
 
-_HANDS_OVER: Final = LocalDelivery.run.__code__
+#: Calls the callbacks of nodes.
+HANDS_OVER: Final = LocalDelivery.run.__code__
 _OF_THE_PROFILE: Final = Path(__file__).parent
 _RESUME: Final = dis.opmap.get("RESUME")  # from Python 3.11 on
 
@@ -93,7 +94,7 @@ class Sampler:
         functions: list[CodeType] = []
         instruction, reader = -1 if frame is None else frame.f_lasti, None
         while frame is not None:
-            if frame.f_code is _HANDS_OVER:
+            if frame.f_code is HANDS_OVER:
                 reader = frame.f_locals.get("reader")
             functions.append(frame.f_code)
             frame = frame.f_back

@@ -14,7 +14,7 @@ from rclpy.task import Future
 
 from rail_msgs_py.delivery import Line, LocalDelivery, LocalReader, Sendable
 
-from .recorded_messages import Carried
+from .recorded_messages import Carried, fail_aloud
 
 #: So many messages are put before they are handed over: as many as a node sends in a turn.
 _TURN: Final = 16
@@ -38,7 +38,7 @@ def hand_over_s(
     delivery = LocalDelivery()
     for name, kinds in readers.items():
         for takes_views in kinds:
-            reader = LocalReader(None, _raise, _ignore, _ignore if takes_views else None)
+            reader = LocalReader(None, fail_aloud, _ignore, _ignore if takes_views else None)
             delivery.line(name).readers.append(reader)
     put, run = delivery.put, delivery.run
     turns: list[list[tuple[Line, Sendable]]] = [[]]
@@ -130,7 +130,3 @@ class MiddlewareLoop:
 
 def _ignore(_: Any) -> None:
     """Reader that does nothing."""
-
-
-def _raise(error: Exception) -> None:
-    raise error

@@ -75,10 +75,6 @@ def test_it_is_checked_run_and_reported(with_it: Rail) -> None:
     shown = with_it.output(with_it.started[-1])
     assert "axles at detection points" in shown
     assert "sections of the axle counter" in shown
-    sites = with_it.report("counted_line", "--processes", "site")
-    assert sites["digest"] == report["digest"]
-    assert sites["axle_counter"] == counted
-    assert sites["processes"] > 10
 
 
 def test_a_miscount_and_a_dead_point_are_in_the_report(with_it: Rail, installed: Path) -> None:
@@ -106,6 +102,9 @@ def test_a_recording_is_reported_where_it_is_installed_and_refused_elsewhere(
     assert "not what the run itself reported" not in with_it.output(again)
     assert json.loads((with_it.directory / "again.json").read_text()) == report
     assert report["axle_counter"]["counted"] == 24
+    sites = with_it.report("counted_line", "--processes", "site", "--duration", 15)
+    assert sites["digest"] == report["digest"] and sites["processes"] > 10
+    assert sites["axle_counter"] == report["axle_counter"]
     monkeypatch.setenv("PYTHONPATH", "")
     refused = with_it.start("report", "run.mcap")
     assert with_it.finish(refused) == 2

@@ -96,7 +96,7 @@ def test_switch_off_a_station(rail: Rail, listener: Listener) -> None:
 
 def test_two_hosts(rail: Rail) -> None:
     before = subprocess.run(["ip", "netns", "list"], capture_output=True, text=True).stdout
-    run = rail.start("branch", 8, command=example("two_hosts.py"))
+    run = rail.start("plain_line", 8, command=example("two_hosts.py"))
     assert rail.finish(run) == 0, rail.errors(run)
     after = subprocess.run(["ip", "netns", "list"], capture_output=True, text=True).stdout
     assert set(after.splitlines()) <= set(before.splitlines())

@@ -29,7 +29,7 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 def test_a_station_that_never_comes(rail: Rail, placement: str) -> None:
     path = rail.directory / "report.json"
     run = rail.start(
-        *("run", "plain_line", "--duration", 15, "--processes", placement, "--timeout", 1),
+        *("run", "plain_line", "--duration", 15, "--processes", placement, "--timeout", 2),
         *("--external", NODE, "--report", path),
     )
     assert rail.finish(run) == 4

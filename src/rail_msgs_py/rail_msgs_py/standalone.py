@@ -89,10 +89,11 @@ def signals_to(handle: Callable[[int], None]) -> Iterator[None]:
 def run_node(make: Callable[[], Any]) -> None:
     """Entry point of a node on its own: arguments, spinning, a clean end.
 
-    Wrong parameters, and a name that another node has, end with one line and exit code 2.
+    Wrong arguments or parameters, and a name that another node has, end with one line and exit
+    code 2.
     """
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
+        _init()
         with ExitStack() as held:
             node = make()
             held.callback(node.destroy_node)
@@ -107,3 +108,14 @@ def run_node(make: Callable[[], Any]) -> None:
         sys.exit(130)
     finally:
         rclpy.try_shutdown()
+
+
+def _init() -> None:
+    """Initialise ROS with the arguments of the command line; ValueError if it takes them not."""
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # RCLError and others, which rclpy does not export
+        # It appends where in its own sources it noticed.
+        reason = str(error).partition(", at /")[0]
+        unknown = type(error).__name__ == "UnknownROSArgsError"
+        raise ValueError(f"unknown ROS arguments {reason}" if unknown else reason) from None

@@ -46,3 +46,9 @@ def test_one_that_never_came_is_not_gone() -> None:
     half, eyes = OtherHalf({"/train_a/vrs"}), Eyes()
     assert not half.look(eyes, ["/train_a/vrs"])
     assert not half.gone
+
+
+def test_one_without_which_nothing_begins_is_gone_when_it_does_not_come() -> None:
+    half, eyes = OtherHalf({"/world"}, patience_s=2.0), Eyes()
+    assert [half.look(eyes) for _ in range(4)] == [False, False, False, True]
+    assert half.gone and not half.seen

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import shutil
 import signal
@@ -37,7 +38,7 @@ from .host import destroy_nodes, load_for_nodes, make_context, make_nodes, run_n
 from .kernels import compile_before_the_first_run
 from .kills import FaultInjector, check_kills, killed_nodes
 from .options import RunOptions, check_recording, default_placement
-from .other_half import OtherHalf
+from .other_half import ELSEWHERE, OtherHalf
 from .parameter_services import ParameterServicesOnDemand
 from .processes import ProcessGroup, remove_orphaned_segments
 from .progress import progress_of
@@ -122,7 +123,9 @@ class _LaunchedRun:
         self._ours = {spec.name for specs in self._groups.values() for spec in specs}
         # Of the wayside the world, without which nothing goes on.
         others = {spec.name for spec in plan.nodes} - self._ours - {*options.external}
-        self._other_half = OtherHalf(others & {WORLD} or others)
+        # Nothing begins without the world, which waits for the nodes that it must have itself.
+        comes_s = 2.0 * options.timeout_s if WORLD in others else math.inf
+        self._other_half = OtherHalf(others & {WORLD} or others, comes_s)
         self._observer: Any = None
         self._progress: Progress | None = None
         self._bar: TaskID | None = None
@@ -140,6 +143,9 @@ class _LaunchedRun:
         )
         for name in self._options.external:
             self._console.print(f"waiting for {name}, which somebody else runs")
+        if self._options.only:
+            rest = ELSEWHERE[self._options.only]
+            self._console.print(f"waiting for {rest}, which somebody else runs")
         # After the recorder, which would hold the other processes to life.
         self._processes = ProcessGroup()
         previous = {
@@ -325,8 +331,8 @@ class _LaunchedRun:
         """End with the other half of the corridor."""
         failed = [failure["node"] for failure in self._observer.failures]
         if self._other_half.look(self._observer, failed):
-            other = "onboard" if self._options.only == "wayside" else "wayside"
-            line = f"the other half of the corridor, {other}, has ended: so does this one"
+            ended = "has ended" if self._other_half.seen else "has not come"
+            line = f"{ELSEWHERE[self._options.only]} {ended}: so this one ends"
             self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)
 
     def _tell_trouble(self, trouble: str | None, so: str = "") -> None:

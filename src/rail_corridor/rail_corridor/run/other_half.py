@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from typing import Any, Final
 
+from rail_corridor.plan.plan import Part
+
+#: What somebody else runs beside a part of the corridor.
+ELSEWHERE: Final[dict[Part | None, str]] = {
+    "wayside": "the onboard half",
+    "onboard": "the wayside half",
+    "report": "the corridor itself",
+}
 #: Wall time between two looks [s].
 _LOOK_S: Final = 0.5
 
@@ -16,14 +25,23 @@ class OtherHalf:
     ----------
     nodes : collection of str
         Full names of those that tell: as long as one of them is there, the half is.
+    patience_s : float
+        Wall time after the first look until a half that never came is gone.
     """
 
-    def __init__(self, nodes: Collection[str]) -> None:
+    def __init__(self, nodes: Collection[str], patience_s: float = math.inf) -> None:
         self._nodes = frozenset(nodes)
+        self._patience_s = patience_s
+        self._first_s: float | None = None
         self._seen = False
         self._looked_s = 0.0
-        #: Whether it has been there and is no longer.
+        #: Whether it has been there and is no longer, or has not come.
         self.gone = False
+
+    @property
+    def seen(self) -> bool:
+        """Whether it has been there."""
+        return self._seen
 
     def look(self, node: Any, failed: Collection[str] = ()) -> bool:
         """Look, now and then, through the eyes of a node: whether it is found gone just now.
@@ -36,11 +54,13 @@ class OtherHalf:
         if self.gone or (self._seen and now_s - self._looked_s < _LOOK_S):
             return False
         self._looked_s = now_s
+        if self._first_s is None:
+            self._first_s = now_s
         names = (f"{space.rstrip('/')}/{n}" for n, space in node.get_node_names_and_namespaces())
         if self._nodes <= {*failed}:
             self.gone = self._seen
         elif not self._nodes.isdisjoint(names):
             self._seen = True
-        elif self._seen:
+        elif self._seen or now_s - self._first_s > self._patience_s:
             self.gone = True
         return self.gone

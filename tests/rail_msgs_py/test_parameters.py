@@ -46,13 +46,24 @@ class FakeNode:
             default = Parameter(name, value=value)
             kind = default.type_
         chosen = self._values.get(name, default)
-        if chosen.type_ not in (kind, Parameter.Type.NOT_SET):
+        free = (kind, Parameter.Type.NOT_SET)
+        if not described.dynamic_typing and chosen.type_ not in free:
             raise InvalidParameterTypeException(chosen, kind.name)
         return chosen
 
 
 def test_defaults_are_those_of_the_dataclass() -> None:
     assert declare(FakeNode(), Example) == Example()
+
+
+def test_a_whole_number_is_a_decimal_too_and_nothing_else_is() -> None:
+    power_dbm = declare(FakeNode(power_dbm=5), Example).power_dbm
+    assert power_dbm == 5.0 and isinstance(power_dbm, float)
+    for wrong in ("5", True):
+        with pytest.raises(ParameterError, match=rf"wrs1: power_dbm: {wrong!r}: must be a number"):
+            declare(FakeNode(power_dbm=wrong), Example)
+    with pytest.raises(ParameterError, match="wrs1: samples: "):
+        declare(FakeNode(samples=960.0), Example)
 
 
 def test_values_in_force_are_typed_and_complete() -> None:
@@ -76,7 +87,6 @@ def test_values_in_force_are_typed_and_complete() -> None:
         {"tones_hz": (375e3, math.nan)},
         {"tones_hz": (0.5,)},
         {"power_dbm": "loud"},
-        {"power_dbm": 3},
         {"samples": 960.0},
         {"name": 5},
         {"active": 1},

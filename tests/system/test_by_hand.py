@@ -7,8 +7,9 @@ import re
 import shutil
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from rclpy.parameter_client import AsyncParameterClient
@@ -38,6 +39,21 @@ def test_a_corridor_started_by_hand_has_the_same_digest(rail: Rail, tmp_path: Pa
     by_hand = json.loads(report.read_text())
     assert by_hand["complete"] and by_hand["nodes"] == 0 and not by_hand["failures"]
     assert by_hand["digest"] == rail.report(*changed)["digest"]
+
+
+def test_a_world_that_refuses_its_parameters_ends_all_of_it(
+    rail: Rail, tmp_path: Path, wait_until: Callable[[Callable[[], Any]], Any]
+) -> None:
+    written = tmp_path / "written"
+    assert rail.finish(rail.start("plan", "plain_line", "--write", written)) == 0
+    again = rail.start("plan", "plain_line", "--write", written)
+    assert rail.finish(again) == 2 and "not empty" in rail.errors(again)
+    world = written / "parameters" / "world.yaml"
+    world.write_text(world.read_text().replace("rate: 0.0", "rate: fast"))
+    run = rail.start(written / "commands.sh", command=["bash"])
+    assert rail.finish(run) == 2
+    assert "world: rate: 'fast': must be a number" in rail.errors(run)
+    wait_until(lambda: not rail.processes())
 
 
 def test_a_second_node_of_a_name_ends_with_one_line(rail: Rail, listener: Listener) -> None:

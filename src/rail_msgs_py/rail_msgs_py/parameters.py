@@ -77,7 +77,13 @@ def _declare_field(node: Any, field: dataclasses.Field[Any], hint: Any) -> Any:
         # An array parameter that nobody sets has no value: there is no typed empty default.
         value = tuple(default if value is None else value)
     else:
+        # ROS takes no 5 for a 5.0, as people write it.
+        described.dynamic_typing = hint is float
         value = node.declare_parameter(field.name, hint(default), described).value
+        if hint is float:
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise TypeError(f"{value!r}: must be a number")
+            value = float(value)
     if refused := quantity_of(field).refusal(value):
         raise ValueError(refused)
     return value

@@ -99,7 +99,8 @@ def run(
         str | None,
         typer.Option(
             "--processes",
-            help="one process, one per site and train, or one per node: one, site, node.",
+            help="one process, one per site and train, or one per node: one, site, node. "
+            "[default: site, or one if that makes more than eight processes to a core]",
             metavar="HOW",
         ),
     ] = None,

@@ -18,7 +18,8 @@ _MOST_TRAINS_SHOWN: Final = 24
 def print_summary(scenario: Scenario, console: Console) -> None:
     """Show tracks, what all equipment makes of them, and trains."""
     network = scenario.network
-    console.print(f"[bold]{scenario.name}[/bold]: {scenario.description}", soft_wrap=True)
+    about = f": {scenario.description}" if scenario.description else ""
+    console.print(f"[bold]{scenario.name}[/bold]{about}", soft_wrap=True)
     for name, track in network.tracks.items():
         parent = network.parent_junction(name)
         where = f", branches off {parent.track} at {parent.at_m:.0f} m" if parent else ""

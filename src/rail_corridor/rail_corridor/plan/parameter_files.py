@@ -18,10 +18,11 @@ import yaml
 
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.equipment.registry import node_kinds
+from rail_corridor.errors import InputError
 from rail_corridor.loading.scenario_files import SCENARIO, files_of
 from rail_corridor.scenario.model import Scenario
 
-from .plan import REPORT, Plan, make_plan
+from .plan import REPORT, WORLD, Plan, make_plan
 
 COMMANDS: Final = "commands.sh"
 _PARAMETERS: Final = "parameters"
@@ -56,9 +57,9 @@ a copy of it: the world file is named relative to it. With ament packages, for e
     {ros2_run}
 
 The world waits for all nodes and the report, at most for `start_timeout_s` of its parameters. The
-report is `rail run {scenario_file} --only report`; it ends with the run. Parameters may be changed:
-`rate` of the world paces the run. Without `--only`, `rail run {scenario_file} --external NODE` runs
-everything but the nodes that are started by hand.
+report is `rail run {scenario_file} --only report`; it ends with the run, nodes that you started do
+not. Parameters may be changed: `rate: 1.0` of the world paces the run. Without `--only`,
+`rail run {scenario_file} --external NODE` runs everything but the nodes that are started by hand.
 """
 
 
@@ -82,9 +83,13 @@ def write_plan(scenario: Scenario, directory: Path) -> Plan:
     OSError
         If a file cannot be written.
     InputError
-        If a file of a track cannot be read any longer.
+        If a file of a track cannot be read any longer, or the folder holds something already that
+        may have been changed by hand.
     """
     files = files_of(scenario)
+    if directory.is_dir() and any(directory.iterdir()):
+        reason = "the folder is not empty; what is in it may have been changed by hand"
+        raise InputError(reason, field="--write", value=str(directory))
     (directory / _PARAMETERS).mkdir(parents=True, exist_ok=True)
     for file in files:
         path = directory / file.name
@@ -147,6 +152,12 @@ def _commands(scenario: str, specs: list[NodeSpec]) -> str:
         python=shlex.quote(sys.executable),
         profile=_PROFILE,
     )
-    nodes = [f'"$PYTHON" -m {module_of(spec)} {arguments_of(spec)} &' for spec in specs]
-    report = f'"$PYTHON" -m rail_corridor.cli.main run {SCENARIO} --only report "$@"'
-    return head + "\n".join([*nodes, "", report, ""])
+    nodes = []
+    for spec in specs:
+        nodes.append(f'"$PYTHON" -m {module_of(spec)} {arguments_of(spec)} &')
+        if spec.name == WORLD:
+            nodes.append("WORLD=$!")
+    report = f'"$PYTHON" -m rail_corridor.cli.main run {SCENARIO} --only report "$@" &'
+    # With the report; at once if the world, without which nothing begins, refuses its parameters.
+    end = ("REPORT=$!", 'wait -n "$WORLD" "$REPORT" || exit', 'wait "$REPORT"')
+    return head + "\n".join([*nodes, "", report, *end, ""])

@@ -17,6 +17,7 @@ from rail_corridor.scenario.model import Scenario
 from .intake import Intake
 
 _MOST_EVENTS_SHOWN = 8
+_FILE_WIDTH = 140
 
 
 def make_report(
@@ -78,18 +79,22 @@ def write_report(report: dict[str, Any], path: Path) -> None:
 
 
 def print_report(report: dict[str, Any], console: Console) -> None:
-    """Show the report as tables."""
+    """Show the report as tables; no number is cut off where it goes to a file."""
+    width = None if console.is_terminal else max(console.width, _FILE_WIDTH)
     for subsystem in subsystems():
         for part in subsystem.tables(report):
-            console.print(part, soft_wrap=isinstance(part, str), highlight=False)
+            soft = isinstance(part, str)
+            console.print(part, soft_wrap=soft, highlight=False, width=None if soft else width)
     factor = report["real_time_factor"]
     speed = f"{factor:.1f} times real time, " if factor else ""
     wall_s = report["wall_time_s"]
     wall = "" if wall_s is None else f" in {wall_s:.1f} s"
+    plural = "process" if report["processes"] == 1 else "processes"
+    nodes = f"{report['nodes']} nodes in {report['processes']} {plural}"
+    if not report["nodes"]:
+        nodes = "nodes that were started elsewhere"
     console.print(
-        f"{report['ticks']} ticks, {report['sim_time_s']:.1f} s simulated{wall}: "
-        f"{speed}{report['nodes']} nodes in "
-        f"{report['processes']} {'process' if report['processes'] == 1 else 'processes'}",
+        f"{report['ticks']} ticks, {report['sim_time_s']:.1f} s simulated{wall}: {speed}{nodes}",
         soft_wrap=True,
     )
     console.print(f"digest {report['digest'][:16]} (the same for every placement and rate)")

@@ -137,8 +137,9 @@ class _LaunchedRun:
         if self._options.record is not None:
             self._recording = self._record(self._options.record, nodes)
         plural = "process" if len(self._groups) == 1 else "processes"
+        here = f"{nodes} nodes in {len(self._groups)} {plural}" if nodes else "the report alone"
         self._console.print(
-            f"[bold]{self._plan.scenario}[/bold]: {nodes} nodes in {len(self._groups)} {plural}, "
+            f"[bold]{self._plan.scenario}[/bold]: {here}, "
             f"{self._plan.ticks * self._plan.tick_s:.0f} s to simulate"
         )
         for name in self._options.external:

@@ -43,7 +43,9 @@ def profile(scenario: Scenario, flame: Path | None, rows: Path | None, console: 
     print_costs(costs, title, console)
     if flame is not None:
         write_flame_graph(probe.sampler.cpu_s(), probe.attribute, title, flame)
-        console.print(f"flame graph written to {flame}", highlight=False, soft_wrap=True)
+        look = "www.speedscope.app, Left Heavy" if flame.suffix == ".json" else "Timeline"
+        line = f"flame graph written to {flame} (choose {look}; its x axis is a sum of time)"
+        console.print(line, highlight=False, soft_wrap=True)
     if rows is not None:
         rows.write_text(json.dumps({"scenario": scenario.name, **costs.values()}, indent=2) + "\n")
     return code

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final, Generic, Protocol, TypeVar
@@ -102,6 +102,10 @@ class Line:
 
     writers: list[Any] = field(default_factory=list)
     readers: list[LocalReader] = field(default_factory=list)
+    #: Message class, where it is no topic of the corridor's table.
+    kind: Any = None
+    #: What becomes of each message before anybody is told of it; as it is, if there is none.
+    intercept: Callable[[Sendable], Iterable[Sendable]] | None = None
     #: Subscriptions to the outside that nobody has needed yet, and whose they would be.
     subscriptions: list[tuple[Any, Callable[[], None]]] = field(default_factory=list)
 
@@ -171,6 +175,7 @@ class LocalDelivery:
         self._to_go_on = False
         self._executor: Any = None
         self._unsettled: list[Callable[[], None]] = []
+        self._when_idle: list[Callable[[], None]] = []
 
     def line(self, name: str) -> Line:
         """Line of the topic of an absolute name."""
@@ -234,6 +239,10 @@ class LocalDelivery:
                 raw = serialised(message)
             put((reader.take_raw, raw, reader))
 
+    def when_idle(self, callback: Callable[[], None]) -> None:
+        """Call back once everything that waits has been handed over, and what comes of it."""
+        self._when_idle.append(callback)
+
     def remove(self, node: Any) -> None:
         """Hand nothing any longer to a node; what it sent may come from outside from now on.
 
@@ -284,6 +293,10 @@ class LocalDelivery:
             if queue and self._executor is not None:
                 self._to_go_on = True
                 self._executor.create_task(self._go_on)
+        if not queue and self._when_idle:
+            callbacks, self._when_idle = self._when_idle, []
+            for callback in callbacks:
+                callback()
 
     def _go_on(self) -> None:
         self._to_go_on = False

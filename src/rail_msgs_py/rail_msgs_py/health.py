@@ -49,6 +49,10 @@ class HealthMixin(RosNode):  # type: ignore[misc]
         now_ns = self._now_ns if stamp_ns is None else stamp_ns
         self._tell_health(now_ns, _without_stamp([status]))
 
+    def health_of(self, what: str) -> DiagnosticStatus | None:
+        """What the node has last said of one aspect of its health; None if nothing."""
+        return self._health.get(what)
+
     def at_tick(self, stamp_ns: int) -> None:
         """Take the simulated time; tell the health of the node in the first tick of each second."""
         self._now_ns = stamp_ns

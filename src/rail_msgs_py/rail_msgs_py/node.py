@@ -29,6 +29,8 @@ from .table import TableWriter
 
 #: Node that reads the run for its report.
 REPORT_NAME = "report"
+#: Aspect of a node's health: what its callbacks have raised.
+SOFTWARE = "software"
 #: Wall time between two looks for senders in other processes.
 _LOOK_OUTSIDE_S = 1.0
 #: Which services a node offers beside its topics: all, none, or the lifecycle's alone.
@@ -292,7 +294,7 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
 
     def _failed_callback(self, error: Exception) -> None:
         self.get_logger().error("".join(traceback.format_exception(error)))
-        self.report(DiagnosticStatus.ERROR, "software", f"{type(error).__name__}: {error}")
+        self.report(DiagnosticStatus.ERROR, SOFTWARE, f"{type(error).__name__}: {error}")
 
     def every(self, period_s: float, callback: Callable[[], None]) -> Any:
         """Timer on the steady wall clock."""

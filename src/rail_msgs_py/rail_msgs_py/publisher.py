@@ -61,7 +61,7 @@ class CorridorPublisher:
         publish_raw, line = self._publisher.handle.publish_raw, self._line
         put = None if delivery is None else delivery.put
 
-        def send(message: Sendable) -> None:
+        def send_on(message: Sendable) -> None:
             raw = message if type(message) is bytes else None
             if sink is not None:
                 raw = serialised(message) if raw is None else raw
@@ -70,6 +70,13 @@ class CorridorPublisher:
                 put(line, message, raw)
             if self._carried:
                 publish_raw(serialised(message) if raw is None else raw)
+
+        def send(message: Sendable) -> None:
+            if line is None or line.intercept is None:
+                send_on(message)
+                return
+            for each in line.intercept(message):
+                send_on(each)
 
         return send
 

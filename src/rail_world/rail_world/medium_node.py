@@ -15,7 +15,7 @@ from rail_msgs_py.tick_node import TickNode
 from rail_msgs_py.topics.tick import DONE
 from rail_msgs_py.topics.world import STATE
 
-from .world_file import Part, read_world_file
+from .world_file import Part, WorldFile, read_world_file
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class MediumNode(TickNode[Parameters]):
 
     def _build(self) -> None:
         self._world = read_world_file(self._p.world_file)
+        self._kinds: dict[str, type[Any]] = {}
         self._done = self.stream_out(DONE, node=self.get_fully_qualified_name())
         super()._build()
 
@@ -58,9 +59,32 @@ class MediumNode(TickNode[Parameters]):
             If the world has no such part.
         """
         try:
-            return self._world.part(name, kind)
+            part = self._world.part(name, kind)
         except LookupError as error:
             raise ParameterError(f"world_file: {self._p.world_file}: {error}") from None
+        self._kinds[name] = kind
+        return part
+
+    def take_faults(self, world: WorldFile) -> None:
+        """Go on in a world in which other faults come, all else being as it was.
+
+        A medium that looks at the faults of its ``description`` in every tick can do so.
+
+        Raises
+        ------
+        LookupError
+            If this one cannot, and its part is another one now.
+        """
+        medium = getattr(self, "_medium", None)
+        for name, kind in self._kinds.items():
+            if world.parts[name] == self._world.parts[name]:
+                continue
+            if type(getattr(medium, "description", None)) is not kind:
+                raise LookupError(
+                    f"{self.get_fully_qualified_name()} reads its faults at the start"
+                )
+            medium.description = world.part(name, kind)  # type: ignore[union-attr]
+        self._world = world
 
     def state_port(self, inputs: TickInputs, trains: int) -> str:
         """Port of the true state of all trains, an array [train, column]; it begins the tick."""

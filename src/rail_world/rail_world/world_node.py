@@ -51,7 +51,8 @@ from rail_world.trains.drive_command import DriveCommand
 from rail_world.trains.traffic import Traffic
 from rail_world.trains.wheels import Wheels, wheel_errors
 
-from .world_file import read_world_file
+from .steps import Steps
+from .world_file import WorldFile, read_world_file
 
 _NOT_RECEIVED = DriveCommand(emergency_brake=True)
 #: Wall time of a tick that nobody answers any longer [s]: who comes back must be able to follow.
@@ -102,6 +103,8 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._waiting: dict[str, tuple[tuple[str, str], ...]] = {}
         self._absent: set[str] = set()
         self._finished = False
+        #: How far it may run; freely, unless it is stepped.
+        self.steps = Steps(self._next_tick)
         names = self._traffic.names
         self._clock_publisher = self.publisher(CLOCK)
         self._begin_tick = self._clock_publisher.send
@@ -218,14 +221,44 @@ class WorldNode(TickNode[WorldParameters], name="world"):
                 return False
         return True
 
+    def take_faults(self, world: WorldFile) -> None:
+        """Go on with other stops and slips, all else being as it was."""
+        self._stops = world.stops
+        for train, wheels in self._wheels.items():
+            wheels.slips = tuple(slip for slip in world.slips if slip.train == train)
+
+    @property
+    def ticks(self) -> int:
+        """Ticks begun so far."""
+        return self._tick + 1
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run has come to its end."""
+        return self._finished
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Who is waited for: before the first tick nodes, later what ends a tick."""
+        return tuple(self._missing) if self._tick < 0 else tuple(self._inbox.missing)
+
+    @property
+    def traffic(self) -> Traffic:
+        """The trains as they are: for judging alone."""
+        return self._traffic
+
     # Ticks -------------------------------------------------------------------------------
 
     def _next_tick(self) -> None:
         if self._finished:
+            self.steps.stand()
             return
         arrived = self._p.end_when_arrived and self._tick >= 0 and self._traffic.all_arrived
         if arrived or (self._p.ticks and self._tick + 1 >= self._p.ticks):
             self._end()
+            self.steps.stand()
+            return
+        if self.steps.over(self.ticks):
             return
         self._tick += 1
         if self._tick > 0:
@@ -342,7 +375,8 @@ class WorldNode(TickNode[WorldParameters], name="world"):
     def _check(self) -> None:
         now_s = self.steady_s()
         if self._tick < 0:
-            self._wait_for_the_start(now_s)
+            if not self.steps.standing:
+                self._wait_for_the_start(now_s)
             return
         if now_s - self._begun_s > self._p.timeout_s:
             # Nothing of the tick may have come, so the inbox cannot tell the stamp by itself.

@@ -109,6 +109,8 @@ class Subsystem:
     options: ClassVar[tuple[SectionOption, ...]] = ()
     nodes: ClassVar[tuple[NodeKind, ...]] = ()
     topics: ClassVar[tuple[Topic, ...]] = ()
+    #: Figures of its report that are zero, or none, in a safe run: ``trains.*.atp.overspeed_s``.
+    hazards: ClassVar[tuple[str, ...]] = ()
     #: Folder of scenarios that come with it, which then run by their names; None if none do.
     scenarios: ClassVar[Path | None] = None
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 from pydantic import BaseModel, Field, create_model
 
 from rail_corridor.equipment.registry import subsystems
-from rail_corridor.scenario.faults import TrainStopFault, WheelSlipFault
+from rail_corridor.scenario.faults import Fault, TrainStopFault, WheelSlipFault
 from rail_corridor.scenario.model import Scenario
 
 
@@ -25,8 +25,7 @@ def scenario_model() -> type[Scenario]:
         for subsystem in subsystems()
         for section in subsystem.sections
     }
-    faults = (TrainStopFault, WheelSlipFault, *(f for each in subsystems() for f in each.faults))
-    fault: Any = Annotated[reduce(or_, faults), Field(discriminator="kind")]
+    fault: Any = Annotated[reduce(or_, _kinds_of_faults()), Field(discriminator="kind")]
     common = Scenario.model_fields["faults"]
     sections["faults"] = (
         tuple[fault, ...],
@@ -39,6 +38,10 @@ def scenario_model() -> type[Scenario]:
     return made
 
 
+def _kinds_of_faults() -> tuple[type[Fault], ...]:
+    return (TrainStopFault, WheelSlipFault, *(f for each in subsystems() for f in each.faults))
+
+
 def parse_scenario(data: object) -> Scenario:
     """A scenario of plain data; no more is checked than each section by itself.
 
@@ -47,6 +50,14 @@ def parse_scenario(data: object) -> Scenario:
     pydantic.ValidationError
     """
     return scenario_model().model_validate(data)
+
+
+def fault_fields(kind: str) -> frozenset[str]:
+    """Names of the fields of a kind of fault; none if there is no such kind."""
+    for fault in _kinds_of_faults():
+        if kind in get_args(fault.model_fields["kind"].annotation):
+            return frozenset(fault.model_fields)
+    return frozenset()
 
 
 def field_names() -> set[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import itertools
 import os
 import tempfile
 from collections.abc import Iterator
@@ -12,10 +13,46 @@ from pathlib import Path
 from rail_corridor.errors import InputError
 
 _PARTS = ("wayside", "onboard")
+_TAKEN = "a corridor is running in this domain already; set another number"
+_TURN = itertools.count()
+
+
+class _TakenError(InputError):
+    """The domain is taken."""
+
+
+#: Domains that are chosen from, where any will do: their ports are below those of the system's own.
+_FREE = range(101, 10, -1)
 
 
 @contextmanager
-def sole_corridor(part: str | None = None, directory: Path | None = None) -> Iterator[None]:
+def free_domain(domain: int | None = None, directory: Path | None = None) -> Iterator[int]:
+    """Hold a ROS domain in which no corridor is on this host: a given one, or any.
+
+    What has just left a domain may still be taken for alive there, so that each search begins
+    elsewhere.
+
+    Raises
+    ------
+    InputError
+        If the given one, or every one, is taken.
+    """
+    start = os.getpid() + next(_TURN) * 7
+    candidates = [domain] if domain is not None else [_FREE[(start + n) % 91] for n in range(91)]
+    for candidate in candidates:
+        try:
+            with sole_corridor(None, directory, domain=str(candidate)):
+                yield candidate
+                return
+        except _TakenError:
+            continue
+    raise InputError(_TAKEN, field="domain", value="any" if domain is None else domain)
+
+
+@contextmanager
+def sole_corridor(
+    part: str | None = None, directory: Path | None = None, *, domain: str | None = None
+) -> Iterator[None]:
     """Hold the ROS domain of this process against other corridors on this host.
 
     Parameters
@@ -24,13 +61,15 @@ def sole_corridor(part: str | None = None, directory: Path | None = None) -> Ite
         The one part that runs here; all may run on one host, each once.
     directory : Path, optional
         Where the lock files are; the system's directory for temporary files if not given.
+    domain : str, optional
+        Another domain than that of the environment.
 
     Raises
     ------
     InputError
         If a corridor, or the same part of one, is running in the domain already.
     """
-    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+    domain = domain or os.environ.get("ROS_DOMAIN_ID") or "0"
     folder = directory or Path(tempfile.gettempdir())
     with ExitStack() as held:
         for name in _PARTS if part is None else (part,):
@@ -39,8 +78,7 @@ def sole_corridor(part: str | None = None, directory: Path | None = None) -> Ite
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
-                reason = "a corridor is running in this domain already; set another number"
-                raise InputError(reason, field="ROS_DOMAIN_ID", value=_number(domain)) from None
+                raise _TakenError(_TAKEN, field="ROS_DOMAIN_ID", value=_number(domain)) from None
         yield
 
 

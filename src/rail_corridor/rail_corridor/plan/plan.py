@@ -120,12 +120,15 @@ def make_plan(
     observed: bool = True,
     timeout_s: float = 30.0,
     external: Iterable[str] = (),
+    attached: Iterable[str] = (),
     observers: Iterable[str] = (),
 ) -> Plan:
     """Plan a run; writes the world file into ``run_directory``.
 
-    The world waits for the nodes of the plan, and for ``observers``, which are not in it.
+    The world waits for the nodes of the plan, and for ``attached`` ones and ``observers``, which
+    are not in it; each tick also for the attached ones to be done.
     """
+    attached = tuple(attached)
     world = world_file(scenario)
     world_path = run_directory / "world.json"
     world_path.write_text(world.model_dump_json())
@@ -139,8 +142,8 @@ def make_plan(
         "world_file": str(world_path),
         "ticks": scenario.ticks,
         "rate": float(rate),
-        "nodes": (*(spec.name for spec in nodes), *observers),
-        "sinks": tuple(spec.name for spec in nodes if kinds[spec.kind].sink),
+        "nodes": (*(spec.name for spec in nodes), *attached, *observers),
+        "sinks": (*(spec.name for spec in nodes if kinds[spec.kind].sink), *attached),
         "clock_readers": len(clocked - {*external}),
         "supervised": trains if supervision else (),
         "odometers": () if odometer_error_of(scenario) is None else trains,

@@ -27,12 +27,14 @@ class Wheels:
     """
 
     def __init__(self, error: float, slips: Sequence[WheelSlip] = ()) -> None:
-        self._scale, self._slips = 1.0 + error, tuple(slips)
+        self._scale = 1.0 + error
+        #: When they slip; may be exchanged for others on the way.
+        self.slips = tuple(slips)
         self._travelled_m = self._lost_m = 0.0
 
     def count(self, time_s: float, travelled_m: float, speed_mps: float) -> tuple[float, float]:
         """Distance [m] and speed [m/s] that they show at the end of a tick of this true way."""
-        ratio = next((s.ratio for s in self._slips if s.from_s <= time_s < s.to_s), 1.0)
+        ratio = next((s.ratio for s in self.slips if s.from_s <= time_s < s.to_s), 1.0)
         self._lost_m += (ratio - 1.0) * (travelled_m - self._travelled_m)
         self._travelled_m = travelled_m
         return self._scale * (travelled_m + self._lost_m), self._scale * ratio * speed_mps

@@ -33,6 +33,7 @@ class LocalizerSubsystem(Subsystem):
 
     name = "localizer"
     sections = (LOCALIZER_SECTION,)
+    hazards = ("trains.*.localizer.exceeded",)
     nodes = (
         NodeKind(
             "localizer",

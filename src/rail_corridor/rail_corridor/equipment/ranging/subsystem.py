@@ -40,6 +40,10 @@ class RangingSubsystem(Subsystem):
     sections = (STATIONS, CHANNELS, SIGNAL, RADIO, TRANSPONDER)
     faults = (DeadStation, Jam)
     options = (SectionOption("--zone-length", "stations", "zone_length_m", ("positions",)),)
+    hazards = (
+        "trains.*.phase_ranging.wrong_track_ticks",
+        "trains.*.phase_ranging.misleading_ticks",
+    )
     nodes = (
         NodeKind(
             "radio_medium",

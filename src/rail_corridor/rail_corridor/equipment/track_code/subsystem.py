@@ -33,6 +33,11 @@ class TrackCodeSubsystem(Subsystem):
     name = "track_code"
     sections = (TRACK_CIRCUITS,)
     faults = (Sanding, DeadTransmitter)
+    hazards = (
+        "trains.*.track_code.wrong",
+        "trains.*.atp.entered_occupied",
+        "trains.*.atp.overspeed_s",
+    )
     nodes = (
         NodeKind(
             "rail_medium",

@@ -31,6 +31,7 @@ class TrainBusSubsystem(Subsystem):
     name = "train_bus"
     sections = (TRAIN_BUS_SECTION,)
     faults = (BusFault,)
+    hazards = ("trains.*.train_bus.false_reports",)
     nodes = (
         NodeKind(
             "bus_medium",

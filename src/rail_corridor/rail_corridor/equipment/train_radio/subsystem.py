@@ -42,6 +42,13 @@ class TrainRadioSubsystem(Subsystem):
     name = "train_radio"
     sections = (CBTC,)
     faults = (DeadBaseStation, NetworkThreats)
+    hazards = (
+        "trains.*.cbtc.forged_accepted",
+        "trains.*.cbtc.forged_reports",
+        "trains.*.cbtc.mislocated",
+        "trains.*.atp.passed_authority",
+        "trains.*.atp.overspeed_s",
+    )
     nodes = (
         NodeKind(
             "cbtc_medium",

@@ -1,0 +1,1 @@
+"""A corridor in this process that stands between calls: for tests, and for studies in Python."""

@@ -1,0 +1,114 @@
+"""Keeps what is sent in a stepped corridor, topic by topic."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from typing import Any
+
+from rail_corridor.equipment.registry import kind_of
+from rail_corridor.errors import InputError
+from rail_corridor.report.intake import names_read
+from rail_msgs_py.delivery import LocalReader
+from rail_msgs_py.waveform import Waveform
+
+from .corridor import SteppedCorridor
+from .topics import TopicHistory
+
+#: Wall time for a message of another process to arrive [s].
+_ARRIVAL_S = 0.5
+
+
+class Histories:
+    """Histories of the topics of a corridor.
+
+    Of all topics but waveforms everything is kept from the beginning on; of a waveform, which is
+    large, from the moment when it is first asked for.
+
+    Parameters
+    ----------
+    corridor : SteppedCorridor
+        Not yet started, so that nothing is missed.
+    """
+
+    def __init__(self, corridor: SteppedCorridor) -> None:
+        self._corridor = corridor
+        self._node = corridor.observer
+        self._histories: dict[str, TopicHistory] = {}
+        #: Of those that come from other processes: how many there were, and whether more came.
+        self._outside: dict[str, tuple[int, bool]] = {}
+        for name, line in corridor.delivery.lines.items():
+            kind = kind_of(name)
+            known = line.kind is not None or (kind is not None and kind.view is not Waveform)
+            if line.writers and known:
+                self._keep(name)
+        # What the report reads of other processes is heard from the first tick on.
+        for name in sorted(names_read(corridor.plan) - self._histories.keys()):
+            self._keep(name)
+            self._outside[name] = (0, False)
+
+    def __getitem__(self, name: str) -> TopicHistory:
+        """History of a topic; InputError if nobody sends on it."""
+        if name not in self._histories:
+            self._keep(name)
+        history = self._histories[name]
+        if not self._corridor.delivery.line(name).writers and name not in self._outside:
+            # What is kept for those who come late is on its way.
+            self._corridor.spin(lambda: history.count > 0, _ARRIVAL_S)
+            self._outside[name] = (history.count, False)
+        return history
+
+    def after_tick(self) -> None:
+        """Wait for what other processes send in every tick."""
+        for name, (count, regular) in self._outside.items():
+            history = self._histories[name]
+            if regular:
+                self._corridor.spin(lambda: history.count > count, _ARRIVAL_S)  # noqa: B023
+            self._outside[name] = (history.count, history.count > count)
+
+    @property
+    def kept(self) -> dict[str, TopicHistory]:
+        """Everything that has been kept, by topic."""
+        return dict(self._histories)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the topics that nodes of this process send on."""
+        return [name for name, line in self._corridor.delivery.lines.items() if line.writers]
+
+    def kind(self, name: str) -> Any:
+        """Message class of a topic; InputError if nobody sends on it."""
+        line, topic = self._corridor.delivery.lines.get(name), kind_of(name)
+        if line is not None and topic is not None and (line.writers or line.readers):
+            return topic.type
+        if line is not None and line.kind is not None:
+            return line.kind
+        return self._kind_outside(name)
+
+    def _keep(self, name: str) -> None:
+        topic, kind = kind_of(name), self.kind(name)
+        history = TopicHistory(name, topic, kind, lambda: self._corridor.ticks - 1)
+        reader = LocalReader(self._node, self._fail, history.take, history.take)
+
+        def subscribe() -> None:
+            qos = 1000 if topic is None else topic.qos
+            self._node.create_subscription(
+                kind, name, self._node.guarded(history.take), qos, raw=True
+            )
+
+        self._corridor.delivery.read(name, reader, subscribe)
+        self._histories[name] = history
+
+    def _kind_outside(self, name: str) -> Any:
+        """Message class of a topic that others publish."""
+        for found, types in self._node.get_topic_names_and_types():
+            if found == name:
+                package, _, message = types[0].partition("/msg/")
+                return getattr(importlib.import_module(f"{package}.msg"), message)
+        close = difflib.get_close_matches(name, self.names, n=1)
+        reason = "nobody sends on it" + (f", did you mean {close[0]}" if close else "")
+        raise InputError(reason, field="topic", value=name)
+
+    @staticmethod
+    def _fail(error: Exception) -> None:
+        raise error

@@ -1,0 +1,138 @@
+"""What befalls a stepped corridor: nodes are killed, restarted and switched, faults change."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+
+from rail_corridor.errors import InputError
+from rail_corridor.plan.plan import WORLD
+from rail_corridor.plan.world_plan import world_file
+from rail_corridor.run.host import make_node
+from rail_corridor.scenario.model import Scenario
+
+from .corridor import StalledError, SteppedCorridor
+
+
+class Interference:
+    """Interferes with a corridor while it stands.
+
+    Parameters
+    ----------
+    corridor : SteppedCorridor
+    """
+
+    def __init__(self, corridor: SteppedCorridor) -> None:
+        self._corridor = corridor
+        self._gone: set[str] = set()
+
+    def kill(self, name: str) -> None:
+        """Take a node out, as if its process had been killed; with it what shares the process.
+
+        Raises
+        ------
+        InputError
+            If it is the world, or no node of the corridor.
+        """
+        corridor = self._corridor
+        self._refuse_world(name)
+        if corridor.sites is not None and name in corridor.sites:
+            corridor.sites.kill(name)
+            killed, reason = corridor.sites.beside(name), "process killed by SIGKILL"
+        else:
+            node = corridor.node(name)
+            del corridor.nodes[name]
+            corridor.executor.remove_node(node)
+            corridor.delivery.remove(node)
+            corridor.dead.append(node)
+            killed, reason = [name], "killed"
+        for each in killed:
+            self._gone.add(each)
+            corridor.call(partial(corridor.observer.announce_failure, each, reason))
+
+    def restart(self, name: str) -> None:
+        """Start a node anew, whether or not it is alive: it knows nothing of what was before.
+
+        Raises
+        ------
+        InputError
+            As of `kill`.
+        StalledError
+            If one in another process is not ready in time.
+        """
+        corridor = self._corridor
+        self._refuse_world(name)
+        if name not in self._gone:
+            self.kill(name)
+        if corridor.sites is not None and name in corridor.sites:
+            back = corridor.sites.beside(name)
+            said = corridor.ready_again(back)
+            corridor.sites.start(name)
+            if not corridor.spin(lambda: said >= {*back}, corridor.timeout_s):
+                lacking = ", ".join(sorted({*back} - said))
+                raise StalledError(f"{lacking}: not ready within {corridor.timeout_s:g} s")
+        else:
+            back = [name]
+            corridor.add_node(make_node(corridor.spec(name), corridor.context, False), name)
+        self._gone.difference_update(back)
+
+    def switch(self, name: str, *, on: bool) -> None:
+        """Switch equipment on or off.
+
+        Raises
+        ------
+        InputError
+            If it cannot be switched.
+        StalledError
+            If one in another process does not answer.
+        """
+        corridor = self._corridor
+        if corridor.sites is not None and name in corridor.sites:
+            self._switch_elsewhere(name, on=on)
+            return
+        node = corridor.node(name)
+        if not hasattr(node, "switch_on"):
+            raise InputError("is no equipment that can be switched", field="node", value=name)
+        if on != node.switched_on:
+            corridor.call(node.trigger_activate if on else node.trigger_deactivate)
+
+    def _switch_elsewhere(self, name: str, *, on: bool) -> None:
+        """Switch equipment of another process, by the service of its life cycle."""
+        corridor = self._corridor
+        client = corridor.observer.create_client(ChangeState, f"{name}/change_state")
+        try:
+            if not corridor.spin(client.service_is_ready, corridor.timeout_s):
+                raise InputError("is no equipment that can be switched", field="node", value=name)
+            request = ChangeState.Request()
+            wanted = Transition.TRANSITION_ACTIVATE if on else Transition.TRANSITION_DEACTIVATE
+            request.transition.id = wanted
+            if not corridor.spin_until(client.call_async(request), corridor.timeout_s):
+                raise StalledError(f"{name}: did not answer within {corridor.timeout_s:g} s")
+        finally:
+            corridor.observer.destroy_client(client)
+
+    def change_faults(self, scenario: Scenario) -> None:
+        """Go on with the faults of another scenario, which has the same of everything else.
+
+        Raises
+        ------
+        LookupError
+            If a medium reads its faults at the start alone, or is in another process.
+        """
+        corridor = self._corridor
+        for spec in corridor.plan.nodes:
+            if spec.side == "world" and spec.name not in corridor.nodes:
+                reason = "is in a process of its own, and reads faults at the start"
+                raise LookupError(f"{spec.name} {reason}")
+        world = world_file(scenario)
+        for node in corridor.nodes.values():
+            if hasattr(node, "take_faults"):
+                node.take_faults(world)
+        corridor.scenario = scenario
+
+    def _refuse_world(self, name: str) -> None:
+        self._corridor.spec(name)
+        if name == WORLD:
+            raise InputError("nothing goes on without the world", field="node", value=name)

@@ -1,0 +1,185 @@
+"""What has been on a topic so far, as typed views."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+
+from rail_msgs_py.delivery import serialised
+from rail_msgs_py.table import Table
+from rail_msgs_py.topics.topic import Topic
+
+
+class NotKnownError(ValueError):
+    """A value was compared that is not known."""
+
+
+class NotKnown(float):
+    """NaN in a table: what is not known is neither more nor less than anything.
+
+    >>> value = NotKnown()
+    >>> value == value, value != value
+    (False, True)
+    >>> 3.0 <= value
+    Traceback (most recent call last):
+        ...
+    rail_corridor.stepped.topics.NotKnownError: compared with a value that is not known
+    """
+
+    def __new__(cls) -> NotKnown:
+        """Make the one there is to say."""
+        return super().__new__(cls, "nan")
+
+    def _refuse(self, other: object) -> bool:
+        raise NotKnownError("compared with a value that is not known")
+
+    __lt__ = __le__ = __gt__ = __ge__ = _refuse
+
+
+class RowView:
+    """One row of a table: its columns are attributes; NaN is `NotKnown`.
+
+    >>> view = RowView(5, "train_a", ("speed_mps", "warning"), [3.5, 1.0])
+    >>> view.speed_mps, view.stamp_s
+    (3.5, 5e-09)
+    """
+
+    __slots__ = ("_columns", "_values", "row", "stamp_ns")
+
+    def __init__(
+        self, stamp_ns: int, row: str, columns: tuple[str, ...], values: Sequence[float]
+    ) -> None:
+        self.stamp_ns, self.row = stamp_ns, row
+        self._columns, self._values = columns, values
+
+    @property
+    def stamp_s(self) -> float:
+        """Simulated time [s]."""
+        return self.stamp_ns * 1e-9
+
+    def as_dict(self) -> dict[str, float]:
+        """Values by column."""
+        return dict(zip(self._columns, map(float, self._values), strict=True))
+
+    def __getattr__(self, name: str) -> float:
+        if name in self._columns:
+            value = float(self._values[self._columns.index(name)])
+            return value if value == value else NotKnown()
+        raise AttributeError(f"no column {name}; there are {', '.join(self._columns)}")
+
+    def __repr__(self) -> str:
+        cells = zip(self._columns, self._values, strict=True)
+        said = ", ".join(f"{column}={float(value):.6g}" for column, value in cells)
+        return f"<{self.stamp_s:.3f} s {self.row}: {said}>"
+
+
+class TableView:
+    """A table of several rows, or of none: ``view["train_a"].speed_mps``."""
+
+    def __init__(self, table: Table) -> None:
+        self._table = table
+        self.stamp_ns = table.stamp_ns
+
+    @property
+    def stamp_s(self) -> float:
+        """Simulated time [s]."""
+        return self.stamp_ns * 1e-9
+
+    @property
+    def rows(self) -> tuple[RowView, ...]:
+        """All rows, in their order."""
+        table = self._table
+        return tuple(
+            RowView(table.stamp_ns, name, table.columns, values)
+            for name, values in zip(table.rows, np.asarray(table.values).tolist(), strict=True)
+        )
+
+    def __getitem__(self, name: str) -> RowView:
+        for row in self.rows:
+            if row.row == name:
+                return row
+        raise KeyError(f"no row {name}; there are {', '.join(self._table.rows)}")
+
+    def __repr__(self) -> str:
+        return f"<{self.stamp_s:.3f} s, rows {', '.join(self._table.rows)}>"
+
+
+def view_of(topic: Topic | None, kind: Any, message: Any) -> Any:
+    """Typed view of what was sent: serialised, or a view already.
+
+    Of a table with one row that row; of a topic without a view the ROS message.
+    """
+    wanted = None if topic is None else topic.view
+    if wanted is None or not isinstance(message, wanted):
+        message = deserialize_message(serialised(message), kind)
+        if wanted is not None:
+            message = wanted.from_msg(message)
+    if not isinstance(message, Table):
+        return message
+    if len(message.rows) != 1:
+        return TableView(message)
+    values = message.values[0].tolist()
+    return RowView(message.stamp_ns, message.rows[0], message.columns, values)
+
+
+class TopicHistory:
+    """Messages of one topic, in the order in which they were sent.
+
+    Parameters
+    ----------
+    name : str
+        Absolute name.
+    topic : Topic, optional
+        Its kind, if it is of the corridor's table.
+    kind : message class
+    tick : callable
+        Number of the tick at hand.
+    """
+
+    def __init__(self, name: str, topic: Topic | None, kind: Any, tick: Callable[[], int]) -> None:
+        self.name = name
+        self._topic, self._kind, self._tick = topic, kind, tick
+        self._messages: list[Any] = []
+        #: Tick in which each message came.
+        self.ticks: list[int] = []
+
+    def take(self, message: Any) -> None:
+        """Keep a message, as it was sent."""
+        self._messages.append(message)
+        self.ticks.append(self._tick())
+
+    @property
+    def count(self) -> int:
+        """Number of messages so far."""
+        return len(self._messages)
+
+    @property
+    def latest(self) -> Any:
+        """View of the newest message.
+
+        Raises
+        ------
+        LookupError
+            If there is none yet.
+        """
+        if not self._messages:
+            raise LookupError(f"{self.name}: nothing has been sent on it yet")
+        return view_of(self._topic, self._kind, self._messages[-1])
+
+    @property
+    def all(self) -> list[Any]:
+        """Views of all messages."""
+        return list(self)
+
+    def __iter__(self) -> Iterator[Any]:
+        return (view_of(self._topic, self._kind, message) for message in self._messages)
+
+    def __len__(self) -> int:
+        return len(self._messages)
+
+    def __repr__(self) -> str:
+        last = f", last {self.latest!r}" if self._messages else ""
+        return f"<{self.name}: {len(self._messages)} messages{last}>"

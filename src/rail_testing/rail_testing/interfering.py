@@ -1,0 +1,117 @@
+"""What a test does to its corridor: messages of its own, faults, switches, kills, interception."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rail_corridor.loading.loader import scenario_from_data
+from rail_corridor.plan.plan import Plan
+from rail_corridor.scenario.model import Scenario
+from rail_corridor.stepped.corridor import SteppedCorridor
+from rail_corridor.stepped.interference import Interference
+from rail_msgs_py.publisher import CorridorPublisher
+
+from .interception import Interception, Interceptor
+from .scenario_source import times_of
+
+
+class InterferingMixin:
+    """The part of `rail_testing.corridor.Corridor` that interferes."""
+
+    _scenario: Scenario
+    _plan: Plan | None
+    _session: SteppedCorridor | None
+    _interference: Interference | None
+
+    def __init__(self) -> None:
+        self._interceptions: dict[str, Interception] = {}
+        self._publishers: dict[str, CorridorPublisher] = {}
+
+    def _running(self) -> SteppedCorridor:
+        raise NotImplementedError
+
+    def _kind(self, topic: str) -> Any:
+        raise NotImplementedError
+
+    def _interfere(self) -> Interference:
+        self._running()
+        assert self._interference is not None
+        return self._interference
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Send a message of ROS, a view of `rail_msgs_py`, or a serialised message."""
+        session = self._running()
+        if topic not in self._publishers:
+            self._publishers[topic] = session.publisher(topic, type(message))
+        publisher = self._publishers[topic]
+        sent = message.to_cdr() if hasattr(message, "to_cdr") else message
+        session.call(lambda: publisher.publish(sent))
+
+    def inject(self, fault: Mapping[str, Any]) -> None:
+        """Let a fault of the scenario's kinds befall it, from now on if it does not say when.
+
+        Parameters
+        ----------
+        fault : mapping
+            As in the list ``faults`` of a scenario, with ``kind``.
+
+        Raises
+        ------
+        InputError
+            If it is wrong.
+        LookupError
+            If it is of a kind that is read at the start alone, and the run has begun.
+        """
+        data = self._scenario.model_dump(mode="json", exclude_unset=True)
+        kind = str(fault.get("kind", ""))
+        complete = {**times_of(kind, self._next_s), **fault}
+        data["faults"] = [*data.get("faults", ()), complete]
+        changed = scenario_from_data(data, directory=Path.cwd())
+        if self._session is not None:
+            self._interfere().change_faults(changed)
+        self._scenario, self._plan = changed, None
+
+    def switch_off(self, node: str) -> None:
+        """Switch equipment off: it answers every tick with silence."""
+        self._interfere().switch(node, on=False)
+
+    def switch_on(self, node: str) -> None:
+        """Switch equipment on: it knows nothing of what was before."""
+        self._interfere().switch(node, on=True)
+
+    def kill(self, node: str) -> None:
+        """End a node as if its process had been killed."""
+        self._interfere().kill(node)
+
+    def restart(self, node: str) -> None:
+        """Start a node anew, whether or not it is alive."""
+        self._interfere().restart(node)
+
+    def intercept(self, topic: str, function: Interceptor | None) -> Interception | None:
+        """Let a function have every message of a topic before anybody else.
+
+        Parameters
+        ----------
+        topic : str
+        function : callable, optional
+            Takes the ROS message, which it may change, and returns what goes on: a message,
+            several, none (None), or `Late` ones. Without it everything passes again.
+        """
+        session = self._running()
+        before = self._interceptions.pop(topic, None)
+        if before is not None:
+            before.remove()
+        if function is None:
+            return None
+        line = session.delivery.line(topic)
+        made = Interception(line, self._kind(topic), function)
+        self._interceptions[topic] = made
+        return made
+
+    @property
+    def _next_s(self) -> float:
+        """Simulated time of the next tick [s]."""
+        ticks = 0 if self._session is None else self._session.ticks
+        return ticks * self._scenario.tick_s

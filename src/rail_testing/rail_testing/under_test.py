@@ -1,0 +1,187 @@
+"""The nodes of a tester: beside the corridor, or in the place of nodes of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rail_corridor.stepped.corridor import SteppedCorridor
+from rail_msgs_py.headers import header_to_cdr
+from rail_msgs_py.node import SOFTWARE, CorridorMixin
+from rail_msgs_py.topics.tick import DONE
+
+from .adoption import Adoption
+
+_GRACE_S = 3.0
+
+
+class NodeError(RuntimeError):
+    """A callback of a node under test has raised."""
+
+
+@dataclass
+class _Entry:
+    node: Any
+    replaces: str | None
+    attach: bool
+    command: Sequence[str] | None
+    within_s: float | None
+    adoption: Adoption | None = None
+    process: subprocess.Popen[bytes] | None = None
+    done: Any = field(default=None)
+
+    @property
+    def elsewhere(self) -> bool:
+        """Whether it is in another process."""
+        return self.node is None
+
+
+class NodesUnderTest:
+    """What a test has added to its corridor."""
+
+    def __init__(self) -> None:
+        self._entries: list[_Entry] = []
+
+    def add(
+        self,
+        node: Any,
+        replaces: str | None,
+        *,
+        attach: bool,
+        command: Sequence[str] | None,
+        within_s: float | None,
+    ) -> None:
+        """Note a node; see `Corridor.add`."""
+        if node is None and command is None and replaces is None:
+            raise ValueError("a node, a command, or the name of what is replaced is needed")
+        self._entries.append(_Entry(node, replaces, attach, command, within_s))
+
+    @property
+    def replaced(self) -> tuple[str, ...]:
+        """Full names of the nodes of the scenario that are not made."""
+        return tuple(entry.replaces for entry in self._entries if entry.replaces)
+
+    @property
+    def awaited(self) -> tuple[str, ...]:
+        """Full names of further nodes that end a tick; none yet that have no name here."""
+        return ()
+
+    @property
+    def patience(self) -> dict[str, float]:
+        """Wall time that a tick waits for those that may be late, by the name of the replaced."""
+        return {
+            entry.replaces: entry.within_s
+            for entry in self._entries
+            if entry.replaces and entry.within_s is not None
+        }
+
+    def enter(self, session: SteppedCorridor, domain: int) -> None:
+        """Make the nodes, and connect them with a corridor that has not started."""
+        session.patience = self.patience
+        for entry in self._entries:
+            if entry.command is not None:
+                environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+                entry.process = subprocess.Popen(
+                    list(entry.command), env=environment, start_new_session=True
+                )
+            if entry.node is None:
+                continue
+            node = self._made(entry, session)
+            entry.node = node
+            session.add_node(node, entry.replaces)
+            if not isinstance(node, CorridorMixin):
+                self._adopt(entry, session)
+
+    def _made(self, entry: _Entry, session: SteppedCorridor) -> Any:
+        """The node itself, made if it is told how."""
+        node = entry.node
+        if not callable(node):
+            return node
+        with _default_context(session.context):
+            if isinstance(node, type) and issubclass(node, CorridorMixin) and entry.replaces:
+                namespace, _, name = entry.replaces.rpartition("/")
+                made = node(
+                    name,
+                    namespace=namespace,
+                    context=session.context,
+                    parameters=session.spec(entry.replaces).parameters,
+                    services=False,
+                )
+            else:
+                made = node()
+        if hasattr(made, "switch_on"):
+            made.switch_on()
+        return made
+
+    def _adopt(self, entry: _Entry, session: SteppedCorridor) -> None:
+        """Let an ordinary node have its messages in time, and say on its behalf what it cannot."""
+        if entry.attach:
+            entry.adoption = Adoption(entry.node, session.delivery, session.context.tap)
+        if entry.replaces:
+            session.announce_ready(entry.replaces)
+            if session.is_sink(entry.replaces) and entry.attach:
+                entry.done = session.observer.publisher(DONE, node=entry.replaces).send
+                session.when_tick_begins(lambda stamp_ns: self._answer(entry, session, stamp_ns))
+
+    @staticmethod
+    def _answer(entry: _Entry, session: SteppedCorridor, stamp_ns: int) -> None:
+        """Say that a tick is done once everything of it has been handed over."""
+        done = entry.done
+        session.delivery.when_idle(lambda: session.call(lambda: done(header_to_cdr(stamp_ns))))
+
+    def after_tick(self, session: SteppedCorridor) -> None:
+        """Look what they have made meanwhile; raise what their callbacks have raised."""
+        for entry in self._entries:
+            if entry.process is not None and entry.process.poll() is not None:
+                code = entry.process.returncode
+                raise NodeError(f"{' '.join(map(str, entry.command or ()))}: ended with {code}")
+            if entry.elsewhere:
+                continue
+            if entry.adoption is not None:
+                entry.adoption.look()
+                if entry.adoption.errors:
+                    error = entry.adoption.errors.pop(0)
+                    said = f"{type(error).__name__}: {error}"
+                    raise NodeError(self._line(entry, session, said)) from error
+            elif isinstance(entry.node, CorridorMixin):
+                health = entry.node.health_of(SOFTWARE)
+                if health is not None:
+                    raise NodeError(self._line(entry, session, health.message))
+
+    @staticmethod
+    def _line(entry: _Entry, session: SteppedCorridor, said: str) -> str:
+        name = entry.replaces or entry.node.get_fully_qualified_name()
+        return f"{name} at tick {session.ticks - 1}: {said}"
+
+    def close(self) -> None:
+        """End the processes that were started."""
+        running = [e.process for e in self._entries if e.process and e.process.poll() is None]
+        for process in running:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGTERM)
+        deadline_s = time.monotonic() + _GRACE_S
+        for process in running:
+            try:
+                process.wait(timeout=max(0.0, deadline_s - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+
+
+@contextlib.contextmanager
+def _default_context(context: Any) -> Iterator[None]:
+    """Let nodes that name no context be made in that of the corridor."""
+    from rclpy import utilities
+
+    before = utilities.g_default_context
+    utilities.g_default_context = context
+    try:
+        yield
+    finally:
+        utilities.g_default_context = before

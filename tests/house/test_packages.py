@@ -48,7 +48,7 @@ def entry_points(package: str) -> dict[str, str]:
     arguments = setup_arguments(package)
     if "entry_points" not in arguments:
         return {}
-    scripts = ast.literal_eval(arguments["entry_points"])["console_scripts"]
+    scripts = ast.literal_eval(arguments["entry_points"]).get("console_scripts", ())
     return {name.strip(): target.strip() for name, target in (s.split("=") for s in scripts)}
 
 

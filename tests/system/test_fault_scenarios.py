@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import pytest
-
 if TYPE_CHECKING:
-    from .conftest import Rail
-
-pytestmark = pytest.mark.system
+    from rail_testing.plugin import CorridorFactory
 
 
 def told(report: dict[str, Any], name: str, message: str) -> list[float]:
@@ -25,8 +21,8 @@ def misleading(report: dict[str, Any]) -> int:
     return sum(train["phase_ranging"]["misleading_ticks"] for train in report["trains"].values())
 
 
-def test_dead_station(rail: Rail) -> None:
-    report = rail.report("dead_station", "--processes", "one")
+def test_dead_station(corridor: CorridorFactory) -> None:
+    report = corridor("dead_station").run_to_end().report
     assert misleading(report) == 0
     controller = "/wayside/zone_controller: train_a"
     # The station before it reaches two zones: past the end of its own it still sees the train...
@@ -41,8 +37,8 @@ def test_dead_station(rail: Rail) -> None:
     assert report["trains"]["train_b"]["phase_ranging"]["availability"] == 1.0
 
 
-def test_jammed_channel(rail: Rail) -> None:
-    report = rail.report("jammed_channel", "--processes", "one")
+def test_jammed_channel(corridor: CorridorFactory) -> None:
+    report = corridor("jammed_channel").run_to_end().report
     assert misleading(report) == 0
     assert 8.0 in told(report, "/wayside/wrs3: zone3", "channel jammed on CH2")
     (jammed_s,) = told(report, "/train_a/vrs: ranging", "channel jammed on CH1")[:1]
@@ -54,8 +50,8 @@ def test_jammed_channel(rail: Rail) -> None:
     assert train["handovers"]["missed"] == 0
 
 
-def test_two_trains_in_one_zone(rail: Rail) -> None:
-    report = rail.report("two_trains", "--processes", "one")
+def test_two_trains_in_one_zone(corridor: CorridorFactory) -> None:
+    report = corridor("two_trains").run_to_end().report
     assert misleading(report) == 0
     (shared_s,) = told(report, "/wayside/wrs3: zone3", "more than one signal in the zone")
     for train in ("train_a", "train_b"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import pytest
@@ -16,27 +15,28 @@ from rail_corridor.studies.handover_scenarios import (
 )
 
 if TYPE_CHECKING:
-    from .conftest import Rail
-
-pytestmark = pytest.mark.system
+    from rail_testing.plugin import CorridorFactory
 
 
 @pytest.mark.parametrize(
     ("situation", "trains", "crossings", "options"),
     [
-        *((Situation(corridor, "running", 500.0), 2, 20, ()) for corridor in CORRIDORS),
-        (Situation("plain", "standing", MANOEUVRE_KMH), 1, 2, ("--duration", 75)),
-        (Situation("branching", "reversing", MANOEUVRE_KMH), 1, 2, ("--duration", 75)),
+        *((Situation(corridor, "running", 500.0), 2, 20, {}) for corridor in CORRIDORS),
+        (Situation("plain", "standing", MANOEUVRE_KMH), 1, 2, {"duration_s": 75.0}),
+        (Situation("branching", "reversing", MANOEUVRE_KMH), 1, 2, {"duration_s": 75.0}),
     ],
     ids=lambda value: value.name if isinstance(value, Situation) else "",
 )
 def test_no_handover_is_missed_and_no_position_is_false(
-    rail: Rail, situation: Situation, trains: int, crossings: int, options: tuple[object, ...]
+    corridor: CorridorFactory,
+    situation: Situation,
+    trains: int,
+    crossings: int,
+    options: dict[str, float],
 ) -> None:
-    path = rail.directory / "run.yaml"
-    path.write_text(json.dumps(scenario_data(situation, trains, seed=3)))
+    data = scenario_data(situation, trains, seed=3) | options
     row = HandoverRow(situation)
-    row.add(rail.report(path, "--processes", "one", *options))
+    row.add(corridor(data).run_to_end().report)
     assert row.crossings >= crossings
     assert row.made == row.crossings
     assert row.violations == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import pytest
@@ -11,17 +10,13 @@ import yaml
 from rail_corridor.loading.loader import builtin_scenarios
 
 if TYPE_CHECKING:
-    from .conftest import Rail
-
-pytestmark = pytest.mark.system
+    from rail_testing.plugin import CorridorFactory
 
 
-def test_a_position_from_all_sensors_keeps_what_it_promises(rail: Rail) -> None:
-    path = rail.directory / "run.yaml"
+def test_a_position_from_all_sensors_keeps_what_it_promises(corridor: CorridorFactory) -> None:
     data = yaml.safe_load(builtin_scenarios()["sensors"].read_text())
     slip = {"kind": "wheel_slip", "train": "train_a", "ratio": 0.6, "from_s": 12.0, "to_s": 15.0}
-    path.write_text(json.dumps(data | {"duration_s": 26.0, "faults": [slip]}))
-    report = rail.report(path, "--processes", "one")
+    report = corridor(data | {"duration_s": 26.0, "faults": [slip]}).run_to_end().report
     assert report["missing_ticks"] == 0 and report["failures"] == []
     train = report["trains"]["train_a"]
     doppler, located = train["doppler"], train["localizer"]
@@ -32,16 +27,15 @@ def test_a_position_from_all_sensors_keeps_what_it_promises(rail: Rail) -> None:
     assert doppler["availability"] > 0.2 and doppler["normalised_error"] < 1.5
 
 
-def test_the_same_wherever_the_nodes_live(rail: Rail) -> None:
-    path = rail.directory / "run.yaml"
+@pytest.mark.system
+def test_the_same_wherever_the_nodes_live(corridor: CorridorFactory) -> None:
     data = yaml.safe_load(builtin_scenarios()["sensors"].read_text())
     short = {
         "tracks": {"main": {"elements": [{"straight_m": 700}], "speed_limits": [[0, 120]]}},
         "faults": [],
         "duration_s": 5.0,
     }
-    path.write_text(json.dumps(data | short))
-    here = rail.recorded(path, "--processes", "one")
-    there = rail.report(path, "--processes", "site")
-    assert here["digest"] == there["digest"]
-    assert {"doppler", "localizer"} <= here["trains"]["train_a"].keys()
+    here = corridor(data | short).run_to_end()
+    there = corridor(data | short, placement="site").run_to_end()
+    assert here.digest == there.digest
+    assert {"doppler", "localizer"} <= here.report["trains"]["train_a"].keys()

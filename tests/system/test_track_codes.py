@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import pytest
-
 if TYPE_CHECKING:
-    from .conftest import Rail
-
-pytestmark = pytest.mark.system
+    from rail_testing.plugin import CorridorFactory
 
 
 def _is_safe(train: dict[str, Any]) -> bool:
@@ -18,8 +14,8 @@ def _is_safe(train: dict[str, Any]) -> bool:
     return bool(code["wrong"] == 0 and atp["overspeed_s"] == 0.0 and atp["entered_occupied"] == 0)
 
 
-def test_a_train_follows_another_through_blocks(rail: Rail) -> None:
-    report = rail.report("follow_codes", "--duration", 110)
+def test_a_train_follows_another_through_blocks(corridor: CorridorFactory) -> None:
+    report = corridor("follow_codes", duration_s=110.0).run_to_end().report
     leader, follower = report["trains"]["leader"], report["trains"]["follower"]
     assert _is_safe(leader)
     assert _is_safe(follower)
@@ -33,8 +29,8 @@ def test_a_train_follows_another_through_blocks(rail: Rail) -> None:
     assert 1.5 < follower["track_code"]["latency_p95_s"] < 3.0
 
 
-def test_a_heedless_driver_is_braked(rail: Rail) -> None:
-    report = rail.report("heedless_driver", "--duration", 140)
+def test_a_heedless_driver_is_braked(corridor: CorridorFactory) -> None:
+    report = corridor("heedless_driver", duration_s=140.0).run_to_end().report
     follower = report["trains"]["follower"]
     assert _is_safe(follower)
     assert follower["distance_m"] > 300.0
@@ -43,8 +39,8 @@ def test_a_heedless_driver_is_braked(rail: Rail) -> None:
     assert follower["atp"]["margin_min_m"] > 400.0
 
 
-def test_a_train_that_loses_the_codes_stops_and_goes_on(rail: Rail) -> None:
-    report = rail.recorded("lost_codes")
+def test_a_train_that_loses_the_codes_stops_and_goes_on(corridor: CorridorFactory) -> None:
+    report = corridor("lost_codes").run_to_end().report
     train = report["trains"]["train_a"]
     assert _is_safe(train)
     assert train["atp"]["interventions"] >= 1

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
-import pytest
 import yaml
 
 from rail_corridor.loading.loader import builtin_scenarios
 
 if TYPE_CHECKING:
-    from .conftest import Rail
-
-pytestmark = pytest.mark.system
+    from rail_testing.plugin import CorridorFactory
 
 #: The fault of `failing_bus` grows in this time [s], on a short line.
 _FROM_S, _TO_S = 3.0, 15.0
 
 
-def test_a_fault_that_grows_is_told_before_the_first_frame_is_lost(rail: Rail) -> None:
+def test_a_fault_that_grows_is_told_before_the_first_frame_is_lost(
+    corridor: CorridorFactory,
+) -> None:
     data = yaml.safe_load(builtin_scenarios()["failing_bus"].read_text())
     (fault,) = data["faults"]
     data |= {
@@ -28,9 +26,7 @@ def test_a_fault_that_grows_is_told_before_the_first_frame_is_lost(rail: Rail) -
         "train_bus": data["train_bus"] | {"period_s": 2.0},
         "faults": [fault | {"from_s": _FROM_S, "to_s": _TO_S}],
     }
-    path = rail.directory / "run.yaml"
-    path.write_text(json.dumps(data))
-    report = rail.report(path, "--processes", "one")
+    report = corridor(data).run_to_end().report
     assert report["missing_ticks"] == 0
     assert report["failures"] == []
     bus = report["trains"]["train_a"]["train_bus"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -12,21 +10,17 @@ import yaml
 from rail_corridor.loading.loader import builtin_scenarios
 
 if TYPE_CHECKING:
-    from .conftest import Rail
-
-pytestmark = pytest.mark.system
+    from rail_testing.plugin import CorridorFactory
 
 
 #: The first stops by itself at this time [s].
 _STOPS_S = 40.0
 
 
-def _written(folder: Path, **changes: Any) -> Path:
-    """File of `moving_block` with fields of its top level changed."""
-    path = folder / "run.yaml"
-    data = yaml.safe_load(builtin_scenarios()["moving_block"].read_text())
-    path.write_text(json.dumps(data | changes))
-    return path
+def _changed(**changes: Any) -> dict[str, Any]:
+    """`moving_block` with fields of its top level changed."""
+    data: dict[str, Any] = yaml.safe_load(builtin_scenarios()["moving_block"].read_text())
+    return data | changes
 
 
 def _is_safe(train: dict[str, Any]) -> bool:
@@ -36,10 +30,11 @@ def _is_safe(train: dict[str, Any]) -> bool:
     return bool(kept and link["forged_accepted"] == 0 and link["mislocated"] == 0)
 
 
-def test_trains_follow_at_braking_distance_and_stop_behind_one_that_stops(rail: Rail) -> None:
+def test_trains_follow_at_braking_distance_and_stop_behind_one_that_stops(
+    corridor: CorridorFactory,
+) -> None:
     stop = {"kind": "train_stop", "train": "first", "from_s": _STOPS_S, "to_s": 90.0}
-    path = _written(rail.directory, faults=[stop], duration_s=62.0)
-    report = rail.report(path, "--processes", "one")
+    report = corridor(_changed(faults=[stop], duration_s=62.0)).run_to_end().report
     trains = report["trains"]
     assert all(_is_safe(train) for train in trains.values())
     assert report["missing_ticks"] == 0
@@ -54,9 +49,9 @@ def test_trains_follow_at_braking_distance_and_stop_behind_one_that_stops(rail: 
         assert train["cbtc"]["age_p95_s"] < 1.0
 
 
-def test_the_same_to_the_last_bit_wherever_the_nodes_live(rail: Rail) -> None:
-    path = _written(
-        rail.directory,
+@pytest.mark.system
+def test_the_same_to_the_last_bit_wherever_the_nodes_live(corridor: CorridorFactory) -> None:
+    data = _changed(
         tracks={"main": {"elements": [{"straight_m": 1000}], "speed_limits": [[0, 80]]}},
         trains=[
             {"name": name, "route": ["main"], "start_m": start_m}
@@ -66,6 +61,6 @@ def test_the_same_to_the_last_bit_wherever_the_nodes_live(rail: Rail) -> None:
         duration_s=6.0,
     )
     digests = {
-        rail.report(path, "--processes", placement)["digest"] for placement in ("one", "site")
+        corridor(data, placement=placement).run_to_end().digest for placement in ("one", "site")
     }
     assert len(digests) == 1

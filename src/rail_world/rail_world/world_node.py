@@ -93,7 +93,8 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         described = read_world_file(self._p.world_file)
         network = described.network()
         self._tick_ns = described.tick_ns
-        self._traffic = Traffic(described.trains, network, described.tick_s)
+        #: The trains as they are: for judging alone.
+        self.traffic = Traffic(described.trains, network, described.tick_s)
         self._stops = described.stops
         self._tick = -1
         self._begun_s = self._started_s = self.steady_s()
@@ -102,10 +103,11 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._missing = {*self._p.nodes, self.get_fully_qualified_name()}
         self._waiting: dict[str, tuple[tuple[str, str], ...]] = {}
         self._absent: set[str] = set()
-        self._finished = False
+        #: Whether the run has come to its end.
+        self.finished = False
         #: How far it may run; freely, unless it is stepped.
         self.steps = Steps(self._next_tick)
-        names = self._traffic.names
+        names = self.traffic.names
         self._clock_publisher = self.publisher(CLOCK)
         self._begin_tick = self._clock_publisher.send
         self._state = self.table_out(STATE, names)
@@ -233,27 +235,17 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         return self._tick + 1
 
     @property
-    def finished(self) -> bool:
-        """Whether the run has come to its end."""
-        return self._finished
-
-    @property
     def missing(self) -> tuple[str, ...]:
         """Who is waited for: before the first tick nodes, later what ends a tick."""
         return tuple(self._missing) if self._tick < 0 else tuple(self._inbox.missing)
 
-    @property
-    def traffic(self) -> Traffic:
-        """The trains as they are: for judging alone."""
-        return self._traffic
-
     # Ticks -------------------------------------------------------------------------------
 
     def _next_tick(self) -> None:
-        if self._finished:
+        if self.finished:
             self.steps.stand()
             return
-        arrived = self._p.end_when_arrived and self._tick >= 0 and self._traffic.all_arrived
+        arrived = self._p.end_when_arrived and self._tick >= 0 and self.traffic.all_arrived
         if arrived or (self._p.ticks and self._tick + 1 >= self._p.ticks):
             self._end()
             self.steps.stand()
@@ -262,10 +254,10 @@ class WorldNode(TickNode[WorldParameters], name="world"):
             return
         self._tick += 1
         if self._tick > 0:
-            self._traffic.step({**self._commands, **self._stopped(self._tick)})
+            self.traffic.step({**self._commands, **self._stopped(self._tick)})
         stamp_ns = self._tick * self._tick_ns
         self._begun_s = self.steady_s()
-        state = self._traffic.state()
+        state = self.traffic.state()
         self._state(stamp_ns, state)
         if stamp_ns % NANOSECONDS < self._tick_ns:
             self._publish_truth(stamp_ns)
@@ -287,14 +279,14 @@ class WorldNode(TickNode[WorldParameters], name="world"):
     def _publish_odometers(self, stamp_ns: int) -> None:
         if not self._odometers:
             return
-        travelled = self._traffic.travelled()
+        travelled = self.traffic.travelled()
         for train, publish in self._odometers.items():
             values = np.array([self._wheels[train].count(1e-9 * stamp_ns, *travelled[train])])
             publish(stamp_ns, values)
 
     def _publish_truth(self, stamp_ns: int) -> None:
         for publish, (name, track, chainage_m, speed_mps) in zip(
-            self._truth, self._traffic.places(), strict=True
+            self._truth, self.traffic.places(), strict=True
         ):
             key = (name, track)
             if key not in self._truth_writers:
@@ -364,7 +356,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._observed_ns = to_ns(message.stamp)
 
     def _end(self) -> None:
-        self._finished = True
+        self.finished = True
         self._watch_timer.cancel()
         header = Header(frame_id="world")
         header.stamp.sec, header.stamp.nanosec = divmod(self._tick * self._tick_ns, NANOSECONDS)

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from rail_testing.plugin import CorridorFactory
+
     from .conftest import Rail
 
 pytestmark = pytest.mark.system
-_SECONDS = 6
+_SECONDS = 6.0
 
 
 def _whole(report: dict[str, Any]) -> bool:
@@ -26,14 +28,15 @@ def _whole(report: dict[str, Any]) -> bool:
     )
 
 
-def test_every_placement_and_rate_gives_the_same_digest(rail: Rail) -> None:
+def test_every_placement_and_rate_gives_the_same_digest(
+    rail: Rail, corridor: CorridorFactory
+) -> None:
+    run = ("branch", "--duration", _SECONDS, "--processes")
     runs = {
-        ("one", 0): rail.report("branch", "--duration", _SECONDS, "--processes", "one"),
-        ("site", 0): rail.recorded("branch", "--duration", _SECONDS, "--processes", "site"),
-        ("node", 0): rail.report("branch", "--duration", _SECONDS, "--processes", "node"),
-        ("one", 8): rail.report(
-            "branch", "--duration", _SECONDS, "--processes", "one", "--rate", 8
-        ),
+        ("one", 0): corridor("branch", duration_s=_SECONDS).run_to_end().report,
+        ("site", 0): rail.recorded(*run, "site"),
+        ("node", 0): rail.report(*run, "node"),
+        ("one", 8): rail.report(*run, "one", "--rate", 8),
     }
     assert all(_whole(report) for report in runs.values())
     assert len({report["digest"] for report in runs.values()}) == 1
@@ -44,9 +47,10 @@ def test_every_placement_and_rate_gives_the_same_digest(rail: Rail) -> None:
     assert runs["one", 8]["real_time_factor"] <= 8.2
 
 
-def test_two_runs_are_alike_and_another_seed_is_not(rail: Rail) -> None:
-    first = rail.report("plain_line", "--duration", _SECONDS, "--processes", "one")
-    again = rail.report("plain_line", "--duration", _SECONDS, "--processes", "one")
-    other = rail.report("plain_line", "--duration", _SECONDS, "--processes", "one", "--seed", 99)
+def test_two_runs_are_alike_and_another_seed_is_not(corridor: CorridorFactory) -> None:
+    first, again, other = (
+        corridor("plain_line", duration_s=_SECONDS, seed=seed).run_to_end().report
+        for seed in (7, 7, 99)
+    )
     assert first["digest"] == again["digest"] != other["digest"]
     assert _whole(first) and _whole(again) and _whole(other)

@@ -26,6 +26,8 @@ from rail_msgs_py.topics.ranging import POSITION, RANGE
 from rail_msgs_py.topics.tick import DONE
 from rail_wayside.zone_controller_node import ZoneControllerParameters, zone_map_of
 
+TICK_S = 0.1  # of the scenario, once that is read
+
 
 class LineFit(TickNode[ZoneControllerParameters], name="zone_controller", namespace="/wayside"):
     """Read every range; answer every tick with a position and `done`."""
@@ -51,7 +53,7 @@ class LineFit(TickNode[ZoneControllerParameters], name="zone_controller", namesp
             if len(self.last) == 5:
                 per_tick_m, now_m = np.polyfit(np.arange(-4, 1), self.last, 1)
                 # 0.6: variance of the end of a line through five points.
-                track, values = zone.track, (now_m, 0.6 * variance_m2, per_tick_m / 0.1, np.inf)
+                track, values = zone.track, (now_m, 0.6 * variance_m2, per_tick_m / TICK_S, np.inf)
         self.position.publish(Position(stamp_ns, self.train, track, *values).to_cdr())
         self.done(header_to_cdr(stamp_ns))
 
@@ -60,5 +62,6 @@ if __name__ == "__main__":
     discover_on("this")
     with tempfile.TemporaryDirectory() as directory:
         plan = make_plan(load_scenario((sys.argv[1:] or ["plain_line"])[0]), Path(directory))
+    TICK_S = plan.tick_s
     (spec,) = (spec for spec in plan.nodes if spec.name == CONTROLLER)
     run_node(lambda: LineFit(parameters=spec.parameters))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -133,7 +134,9 @@ class SteppedCorridor:
         #: Nodes that were killed; what was under way to one would find no handle if it were gone.
         self.dead: list[Any] = []
         #: Spins all nodes of this process.
-        self.executor = EventsExecutor(context=self.context)
+        # rclpy lets faults of the process be told on standard error, which a test may have replaced.
+        with contextlib.redirect_stderr(sys.__stderr__):
+            self.executor = EventsExecutor(context=self.context)
         self.observer = Observer(
             self.plan,
             lambda: None,
@@ -256,7 +259,7 @@ class SteppedCorridor:
     @property
     def time_s(self) -> float:
         """Simulated time of the last tick [s]; 0 before the first."""
-        return max(self.ticks - 1, 0) * self.plan.tick_s
+        return round(max(self.ticks - 1, 0) * self.plan.tick_s, 9)
 
     @property
     def finished(self) -> bool:

@@ -1,14 +1,18 @@
-"""A running corridor, looked into with ``rail topics``, ``rail echo`` and ``rail hz``."""
+"""A running corridor, looked into with ``rail topics``, ``echo``, ``hz`` and ``plot``."""
 
 from __future__ import annotations
 
+import json
 import re
 import signal
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from std_msgs.msg import String
 
+from rail_msgs_py.topics.qos import LATCHED
 from rail_msgs_py.topics.tick import CLOCK
 
 if TYPE_CHECKING:
@@ -26,6 +30,9 @@ ECHOES = {
 def test_topics_echo_and_hz_of_a_running_corridor(
     rail: Rail, listener: Listener, wait_until: Callable[..., Any]
 ) -> None:
+    nothing = rail.start("topics")
+    assert rail.finish(nothing) == 1
+    assert rail.output(nothing) == "no corridor is running on this host and ROS_DOMAIN_ID\n"
     clock = listener.listen(CLOCK)
     run = rail.start("run", "plain_line", "--duration", 600, "--rate", 2, "--processes", "one")
     listener.until(lambda: len(clock) > 2)
@@ -34,6 +41,21 @@ def test_topics_echo_and_hz_of_a_running_corridor(
     raw = rail.start("echo", "/wayside/wrs1/zone1/range", "--once", "--raw")
     listed = rail.start("topics")
     nobody = rail.start("echo", "/nobody", "--once")
+    fast = ("--where", "speed_mps > 0", "--field", "path_m,speed_mps", "--count", 2)
+    table = rail.start("echo", "/world/state", *fast, "--every", 5, "--format", "csv")
+    wrong = rail.start("echo", "/world/state", "--field", "nobody.speed_mps")
+    piped = rail.start(
+        "-c",
+        f"set -o pipefail; {sys.executable} -m rail_corridor.cli.main echo /clock | head -n 1",
+        command=["bash"],
+    )
+    # One that is no part of the corridor is found as well.
+    listener.node.create_publisher(String, "/foreign", LATCHED).publish(String(data="here"))
+    foreign = rail.start("echo", "/foreign", "--once", "--format", "json")
+    plot = rail.start(
+        *("plot", "/world/state.speed_mps", "/wayside/wrs1/zone1/range.range_m"),
+        *("--seconds", 2, "--out", "plot.png"),
+    )
     rate = rail.start("hz", "/clock")
     for topic, pattern in ECHOES.items():
         assert rail.finish(echoes[topic]) == 0, rail.errors(echoes[topic])
@@ -46,6 +68,21 @@ def test_topics_echo_and_hz_of_a_running_corridor(
     assert rail.output(nobody) == ""
     assert rail.errors(nobody).count("\n") == 1
     assert "/nobody: nobody publishes it" in rail.errors(nobody)
+    assert rail.finish(table) == 0
+    header, *rows = rail.output(table).splitlines()
+    assert header == "stamp_s,path_m,speed_mps"
+    (first_s, *first), (second_s, *_) = [[float(cell) for cell in row.split(",")] for row in rows]
+    assert second_s - first_s == pytest.approx(0.5)
+    assert min(first) > 0.0
+    assert rail.finish(wrong) == 2
+    assert rail.output(wrong) == "" and rail.errors(wrong).count("\n") == 1
+    assert "train_a.speed_mps" in rail.errors(wrong)
+    assert rail.finish(piped) == 0, rail.errors(piped)
+    assert (rail.output(piped), rail.errors(piped)) == ("clock:\n", "")
+    assert rail.finish(foreign) == 0
+    assert json.loads(rail.output(foreign)) == {"stamp_s": None, "data": "here"}
+    assert rail.finish(plot) == 0, rail.errors(plot)
+    assert (rail.directory / "plot.png").read_bytes().startswith(b"\x89PNG")
     wait_until(lambda: "10.0 Hz of simulated time" in rail.output(rate))
     rate.send_signal(signal.SIGINT)
     assert rail.finish(rate) == 0

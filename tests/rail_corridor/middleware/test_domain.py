@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rail_corridor.errors import InputError
-from rail_corridor.middleware.domain import sole_corridor
+from rail_corridor.middleware.domain import is_held, sole_corridor
 
 
 @pytest.fixture(autouse=True)
@@ -35,3 +35,14 @@ def test_another_domain_is_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         monkeypatch.setenv("ROS_DOMAIN_ID", "8")
         with sole_corridor(None, tmp_path):
             pass
+
+
+@pytest.mark.parametrize("part", [None, "wayside", "onboard"])
+def test_whether_a_domain_is_held(tmp_path: Path, part: str | None) -> None:
+    assert not is_held(tmp_path)
+    with sole_corridor(part, tmp_path):
+        assert is_held(tmp_path)
+        # Looking does not stand in the way of the other part.
+        with sole_corridor("onboard" if part == "wayside" else "report", tmp_path):
+            pass
+    assert not is_held(tmp_path)

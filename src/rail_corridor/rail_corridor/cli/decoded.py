@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -62,10 +63,19 @@ def _waveform(block: Waveform) -> str:
 def _table(table: Table) -> str:
     lines = []
     for name, values in zip(table.rows, table.values, strict=True):
-        pairs = zip(table.columns, values, strict=True)
-        cells = "  ".join(f"{column} {value:.6g}" for column, value in pairs)
-        lines.append(f"{_time(table.stamp_ns)}  {name}: {cells}")
+        pairs = zip(table.columns, values.tolist(), strict=True)
+        lines.append(values_line(table.stamp_ns * 1e-9, name, pairs))
     return "\n".join(lines)
+
+
+def values_line(stamp_s: float | None, row: str | None, pairs: Iterable[tuple[str, Any]]) -> str:
+    """Time, row and values by name in one line; time and row are left out where there is none."""
+    cells = "  ".join(
+        f"{name} {value:.6g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in pairs
+    )
+    head = "" if stamp_s is None else f"{stamp_s:10.3f} s  "
+    return f"{head}{row}: {cells}" if row is not None else head + cells
 
 
 def _status(status: Any) -> str:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_recording
 from .usage import UsageError, check_library, check_writable
 
 
@@ -27,7 +28,12 @@ def figures(
     ] = None,
     recording: Annotated[
         Path | None,
-        typer.Option("--from", help="A recording: the figures of that run.", metavar="FILE.mcap"),
+        typer.Option(
+            "--from",
+            help="A recording: the figures of that run.",
+            metavar="FILE.mcap",
+            autocompletion=complete_recording,
+        ),
     ] = None,
     listing: Annotated[
         bool, typer.Option("--list", help="Show names and captions; draw nothing.")

@@ -16,6 +16,7 @@ import typer
 from rail_corridor.view.command import view
 
 from .figures import add_to as add_figures
+from .live import add_to as add_live
 from .recordings import add_to as add_recordings
 from .studies import add_to as add_studies
 from .usage import (
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from rail_corridor.scenario.model import Scenario
 
 app = typer.Typer(
-    add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     help="A railway signalling corridor on ROS 2, at waveform level.",
@@ -263,36 +263,7 @@ def scenarios() -> None:
     print_scenarios(Console())
 
 
-@app.command()
-def topics() -> None:
-    """List the topics of the running corridor, and what they carry."""
-    from .live_tools import list_topics
-
-    raise typer.Exit(list_topics())
-
-
-@app.command()
-def echo(
-    topic: Annotated[str, typer.Argument(help="Absolute name of a topic.", metavar="TOPIC")],
-    once: Annotated[bool, typer.Option("--once", help="Stop after one message.")] = False,
-    raw: Annotated[bool, typer.Option("--raw", help="Show the message as it is.")] = False,
-) -> None:
-    """Show the messages of a topic, decoded."""
-    from .live_tools import echo_topic
-
-    raise typer.Exit(echo_topic(topic, once=once, raw=raw))
-
-
-@app.command()
-def hz(
-    topic: Annotated[str, typer.Argument(help="Absolute name of a topic.", metavar="TOPIC")],
-) -> None:
-    """Show how often a topic is published, in wall and in simulated time."""
-    from .live_tools import topic_rate
-
-    raise typer.Exit(topic_rate(topic))
-
-
+add_live(app)
 app.command()(view)
 
 

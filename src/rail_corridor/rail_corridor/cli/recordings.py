@@ -7,9 +7,17 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_recording
 from .usage import UsageError, check_library, check_writable
 
-Recording = Annotated[Path, typer.Argument(help="A recording: an MCAP file.", metavar="FILE.mcap")]
+Recording = Annotated[
+    Path,
+    typer.Argument(
+        help="A recording: an MCAP file.",
+        metavar="FILE.mcap",
+        autocompletion=complete_recording,
+    ),
+]
 
 
 def add_to(app: typer.Typer) -> None:

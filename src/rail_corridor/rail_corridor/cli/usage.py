@@ -9,12 +9,24 @@ from typing import Annotated, TypeVar
 
 import typer
 
+from .completion import complete_json, complete_scenario
+
 ScenarioArgument = Annotated[
-    str, typer.Argument(help="Name of a built-in scenario, or a YAML file.", metavar="SCENARIO")
+    str,
+    typer.Argument(
+        help="Name of a built-in scenario, or a YAML file.",
+        metavar="SCENARIO",
+        autocompletion=complete_scenario,
+    ),
 ]
 TrackOption = Annotated[
     Path | None,
-    typer.Option("--track", help="TTOBench file that replaces the first track.", metavar="FILE"),
+    typer.Option(
+        "--track",
+        help="TTOBench file that replaces the first track.",
+        metavar="FILE",
+        autocompletion=complete_json,
+    ),
 ]
 
 

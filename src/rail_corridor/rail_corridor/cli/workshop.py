@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_file
 from .usage import UsageError, check_choice, check_writable
 
 _FIGURES = (".png", ".svg", ".pdf")
@@ -20,7 +21,12 @@ def add_to(app: typer.Typer) -> None:
 
 def tdr(
     trace: Annotated[
-        Path, typer.Argument(help="The trace: CSV, or Touchstone .s1p.", metavar="TRACE.csv")
+        Path,
+        typer.Argument(
+            help="The trace: CSV, or Touchstone .s1p.",
+            metavar="TRACE.csv",
+            autocompletion=complete_file,
+        ),
     ],
     profile: Annotated[
         str,

@@ -73,13 +73,35 @@ def sole_corridor(
     folder = directory or Path(tempfile.gettempdir())
     with ExitStack() as held:
         for name in _PARTS if part is None else (part,):
-            path = folder / f"rail_corridor_{os.getuid()}_domain_{domain}_{name}.lock"
+            path = folder / _lock_name(domain, name)
             lock = held.enter_context(path.open("w"))
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise _TakenError(_TAKEN, field="ROS_DOMAIN_ID", value=_number(domain)) from None
         yield
+
+
+def is_held(directory: Path | None = None) -> bool:
+    """Whether a corridor of this user, or a part of one, holds the ROS domain on this host."""
+    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+    folder = directory or Path(tempfile.gettempdir())
+    return any(_is_locked(folder / _lock_name(domain, part)) for part in _PARTS)
+
+
+def _lock_name(domain: str, part: str) -> str:
+    return f"rail_corridor_{os.getuid()}_domain_{domain}_{part}.lock"
+
+
+def _is_locked(path: Path) -> bool:
+    """Whether a file is locked; asks the kernel, as a lock of our own could refuse a corridor."""
+    try:
+        inode = str(path.stat().st_ino)
+        locks = Path("/proc/locks").read_text().splitlines()
+    except OSError:
+        return False
+    # "1: FLOCK  ADVISORY  WRITE 4711 00:2b:1234 0 EOF"
+    return any(f":{inode} " in lock and " FLOCK " in lock for lock in locks)
 
 
 def _number(domain: str) -> int | str:

@@ -73,7 +73,8 @@ RANGE: Final = Topic(
     RangeReading,
     "wrs",
     "zone_controller",
-    "Range to the train in the zone with its variance; inf = no signal, nan = unusable.",
+    "Range to the train in the zone with its variance; inf = no signal, nan = unusable. Its "
+    "radiation type is INFRARED, as the message has none for radio.",
     below_owner=2,
 )
 VRS_RX: Final = Topic(

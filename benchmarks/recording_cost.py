@@ -79,7 +79,7 @@ def compressions() -> Iterator[dict[str, Any]]:
         writer.start("ros2")
         schema = writer.register_schema("any", "ros2msg", b"")
         numbers: dict[str, int] = {}
-        for channel, time_ns, data in messages:
+        for channel, time_ns, data, _ in messages:
             if channel.topic not in numbers:
                 numbers[channel.topic] = writer.register_channel(channel.topic, "cdr", schema)
             writer.add_message(numbers[channel.topic], time_ns, data, time_ns)

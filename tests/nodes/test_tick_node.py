@@ -22,6 +22,7 @@ from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.table import Table, TableWriter
 from rail_msgs_py.tick_node import EquipmentNode, TickNode
+from rail_msgs_py.topics.column import Column
 from rail_msgs_py.topics.qos import STREAM
 from rail_msgs_py.topics.tick import CLOCK, DONE
 from rail_msgs_py.topics.topic import Topic
@@ -35,7 +36,9 @@ TICK_NS = 100_000_000
 
 
 def topic(pattern: str, column: str) -> Topic:
-    return Topic(pattern, Float64MultiArray, STREAM, Table, "", "", "", (column,))
+    return Topic(
+        pattern, Float64MultiArray, STREAM, Table, "", "", "", (Column(column, "a number"),)
+    )
 
 
 PULSES = topic("/wayside/{site}/head/pulses", "pulses")

@@ -27,9 +27,11 @@ from rail_corridor.recording.frames import (
     channel_frame,
     metadata_frame,
 )
-from rail_corridor.recording.mcap_file import RecordingFile
 from rail_corridor.recording.mcap_recorder import McapRecorder, Source
+from rail_corridor.recording.part_names import Split
+from rail_corridor.recording.parts import Recording
 from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
+from rail_corridor.recording.topic_selection import EVERY_TOPIC, TopicSelection
 from rail_corridor.report.from_recording import report_of
 from rail_corridor.report.intake import Intake
 from rail_corridor.report.report import make_report, report_text
@@ -131,11 +133,19 @@ def _write(
     report: dict[str, Any] | None = None,
     *,
     files: list[Attachment] | None = None,
+    selection: TopicSelection = EVERY_TOPIC,
+    part_bytes: int | None = None,
 ) -> None:
     """Record these messages; with the report of the run, if it came to one."""
-    beginning = {BEGIN: RunStart(scenario.name, scenario.seed, NODES, PROCESSES).values()}
+    run_start = RunStart(scenario.name, scenario.seed, NODES, PROCESSES, selection)
+    split = None if part_bytes is None else Split(path, part_bytes, "made up")
     with path.open("wb") as stream:
-        recorder = McapRecorder(stream, files_of(scenario) if files is None else files, beginning)
+        recorder = McapRecorder(
+            stream,
+            files_of(scenario) if files is None else files,
+            {BEGIN: run_start.values()},
+            split,
+        )
         source, numbers = Source(), {}
         for topic, name, raw in said:
             if name not in numbers:
@@ -150,6 +160,7 @@ def _write(
             end = RunEnd(report["complete"], report["ticks"], report["wall_time_s"])
             recorder.take(source, METADATA, 0, memoryview(metadata_frame(END, end.values()))[7:])
         recorder.close()
+        recorder.stream.close()
 
 
 class MadeUpRun:
@@ -176,7 +187,7 @@ class MadeUpRun:
         _write(self.path, self.scenario, said or self.said, report, **more)
 
     def reported(self) -> dict[str, Any]:
-        with RecordingFile(self.path) as file:
+        with Recording(self.path) as file:
             return report_of(file)
 
 

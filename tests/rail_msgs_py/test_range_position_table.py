@@ -71,6 +71,12 @@ def test_special_ranges_mean_what_rep_117_says(
     assert (reading.usable, reading.disturbed) == (usable, disturbed)
 
 
+def test_a_range_has_a_radiation_type_that_the_message_defines() -> None:
+    raw = RangeWriter("zone1", 0.0, 400.0).write(0, 12.0, 0.25)
+    for message in (RangeReading.from_cdr(raw).to_msg(), deserialize_message(raw, Range)):
+        assert message.radiation_type == Range.INFRARED
+
+
 def test_a_range_names_its_zone_and_its_unambiguous_interval() -> None:
     message = RangeReading(1_250_000_000, "zone1", 120.5, 0.25, -20.0, 379.75).to_msg()
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (1, 250_000_000)

@@ -34,8 +34,25 @@ _PATIENCE_S = 60.0
 
 
 def find_browser() -> str | None:
-    """Return the path of an installed browser, None if there is none."""
-    return next((path for path in map(shutil.which, NAMES) if path), None)
+    """Return the path of an installed browser, None if there is none.
+
+    A program that only asks for a snap, as Ubuntu has under these names, is none.
+    """
+    return next((path for path in map(shutil.which, NAMES) if path and _tells_version(path)), None)
+
+
+def _tells_version(program: str) -> bool:
+    try:
+        told = subprocess.run(
+            [program, "--version"],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=_PATIENCE_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return told.returncode == 0
 
 
 class Browser:

@@ -20,7 +20,7 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
-from rail_corridor.recording.mcap_file import RecordingFile
+from rail_corridor.recording.parts import Recording
 from rail_corridor.report.from_recording import report_of
 from rail_msgs_py.topics.topic import Topic
 
@@ -115,7 +115,7 @@ class Rail:
 
     def again(self, recording: Path) -> dict[str, Any]:
         """Return the report of a recording, which must be whole, computed from its messages."""
-        with RecordingFile(recording) as file:
+        with Recording(recording) as file:
             report = report_of(file)
         assert file.cut_at is None
         return report

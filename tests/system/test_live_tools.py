@@ -61,7 +61,7 @@ def test_topics_echo_and_hz_of_a_running_corridor(
         assert rail.finish(echoes[topic]) == 0, rail.errors(echoes[topic])
         assert re.search(pattern, rail.output(echoes[topic])), rail.output(echoes[topic])
     assert rail.finish(raw) == 0
-    assert re.search(r"radiation_type: 255\n.*\nmin_range: ", rail.output(raw))
+    assert re.search(r"radiation_type: 1\n.*\nmin_range: ", rail.output(raw))
     assert rail.finish(listed) == 0
     assert "/wayside/wrs1/zone1/tx" in rail.output(listed)
     assert rail.finish(nobody) == 1

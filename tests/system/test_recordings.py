@@ -11,6 +11,7 @@ import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -19,9 +20,16 @@ from mcap.reader import NonSeekingReader
 from rosbags.highlevel import AnyReader
 
 from rail_corridor.equipment.registry import kind_of
+from rail_corridor.loading.loader import load_scenario
+from rail_corridor.plan.plan import make_plan
+from rail_corridor.recording.part_names import parts_of
+from rail_corridor.recording.parts import Recording
+from rail_corridor.recording.topic_selection import TopicSelection
+from rail_corridor.run.recorded_topics import check_topics
 from rail_msgs_py.stamps import to_ns
 from rail_msgs_py.topics.qos import STREAM
 from rail_msgs_py.topics.tick import CLOCK, READY
+from rail_msgs_py.waveform import Waveform
 
 if TYPE_CHECKING:
     from .conftest import Listener, Rail
@@ -119,3 +127,23 @@ def test_a_full_disk_is_told_and_the_run_goes_on(rail: Rail) -> None:
     assert rail.errors(run) == f"rail: {path}: No space left on device\n"
     assert rail.output(run).count("has failed") == 1
     assert json.loads(json_path.read_text())["complete"]
+
+
+def test_a_selection_in_parts_gives_the_report_of_the_run(rail: Rail) -> None:
+    path = rail.directory / "run.mcap"
+    report = rail.report(
+        *("moving_block", "--duration", 60, "--processes", "one", "--record", path),
+        *("--no-waveforms", "--record-split", 1),
+    )
+    assert len(parts_of(path)) > 1
+    assert rail.again(path) == report
+    with Recording(path) as file:
+        for _ in file.chunks(lambda _: False):
+            pass
+        names = {channel.topic for channel in file.channels}
+    kinds = {name: kind_of(name) for name in names}
+    assert not [name for name, kind in kinds.items() if kind and kind.view is Waveform]
+    # Whatever is there can be asked for by its name.
+    with TemporaryDirectory() as directory:
+        plan = make_plan(load_scenario("moving_block"), Path(directory))
+    check_topics(TopicSelection(tuple(names), waveforms=False), plan)

@@ -12,6 +12,8 @@ import pytest
 from axle_counter.corridor.placement import layout_of
 from axle_counter.corridor.subsystem import AXLE_COUNTER
 from axle_counter.corridor.truth import empty_at_start
+from axle_counter.signals.section_counter import Occupancy
+from axle_counter.topics import SECTIONS
 from builders import LINE
 
 from rail_corridor.cli.decoded import decode
@@ -52,9 +54,18 @@ def test_the_references_describe_it() -> None:
     text = tables()
     for topic in AXLE_COUNTER.topics:
         assert topic.text in text
+        assert all(column.text in text for column in topic.table)
     for kind in AXLE_COUNTER.nodes:
         assert f"### {kind.name}\n" in text
     assert "wheel_sensor_medium" in ends_of(STATE)[1]
+
+
+def test_every_column_is_explained() -> None:
+    tables_of = [topic for topic in AXLE_COUNTER.topics if topic.view is Table]
+    assert tables_of
+    assert all(topic.columns for topic in tables_of)
+    told = " ".join(f"{int(value)} {value.name.replace('_', ' ').lower()}," for value in Occupancy)
+    assert SECTIONS.column_texts[SECTIONS.index["occupancy"]] == told.rstrip(",")
 
 
 def test_points_divide_the_track_and_a_branch_begins_in_a_section(scenario: Make) -> None:

@@ -2,7 +2,8 @@
 
 ``header.frame_id`` is the track, ``child_frame_id`` the train, ``pose.position.x`` the
 chainage [m], ``twist.linear.x`` the speed along the track [m/s]. An infinite variance says
-that the position is *not known*: the chainage is then only the last one that was.
+that the position is *not known*: the chainage is then only the last one that was. The frame has
+one dimension: the other coordinates are zero by its definition, and so are their variances.
 """
 
 from __future__ import annotations

@@ -18,13 +18,24 @@ from rclpy.qos import (
 )
 
 import rail_msgs_py.topics
-from rail_corridor.cli.topic_docs import ends_of
+from rail_corridor.cli.topic_docs import column_tables, ends_of
 from rail_corridor.equipment.registry import kind_of, topics
+from rail_msgs_py.table import Table
+from rail_msgs_py.topics.column import Column
+from rail_msgs_py.topics.doppler import DOPPLER_FIX
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
-from rail_msgs_py.topics.ranging import RANGE
+from rail_msgs_py.topics.ranging import RANGE, VRS_CHANNEL
 from rail_msgs_py.topics.tick import FAILED, FINISHED, OBSERVED, READY
 from rail_msgs_py.topics.topic import Topic
+from rail_msgs_py.topics.train_bus import BUS_STATE, BUS_TREND
+from rail_msgs_py.topics.train_radio import STRIKES
 from rail_msgs_py.topics.world import CORRIDOR_PATH
+from rail_signals.doppler.solver import NoFixReason
+from rail_signals.localizer.protection_level import ProtectionReason, Status
+from rail_signals.localizer.settings import Sensor
+from rail_signals.train_bus.faults import KINDS
+from rail_world.train_radio.frame_threats import Threat
 
 PARTS = {
     "train": ("train_1", "a", "world_2"),
@@ -86,6 +97,57 @@ def test_every_topic_is_documented(topic: Topic) -> None:
         assert text.strip()
     assert topic.text.endswith(".")
     assert name_of(topic.qos) in ("stream", "estimate", "latched")
+
+
+@pytest.mark.parametrize("topic", [t for t in topics() if t.view is Table], ids=lambda t: t.pattern)
+def test_every_column_of_a_table_is_explained(topic: Topic) -> None:
+    assert topic.table
+    assert len(topic.column_texts) == len(topic.columns)
+    assert len({column.name for column in topic.table}) == len(topic.table)
+    for column in topic.table:
+        # Without a unit in its name it is a count, a number of something, a flag, or it says what.
+        assert column.unit or len(column.text.split()) > 3, column.name
+        assert f"| `{column.name.replace('{', '<').replace('}', '>')}` | {column.unit} | " in (
+            column_tables()
+        )
+
+
+def test_a_table_whose_columns_the_scenario_counts_has_no_fixed_ones() -> None:
+    assert VRS_CHANNEL.columns == VRS_CHANNEL.column_texts == ()
+    assert VRS_CHANNEL.table[-1].unit == "dBm"
+
+
+@pytest.mark.parametrize(("name", "text"), [("", "a number"), ("axles", "")])
+def test_a_column_without_name_or_text_is_refused(name: str, text: str) -> None:
+    with pytest.raises(ValueError, match="needs a name and a text"):
+        Column(name, text)
+
+
+ENUMERATIONS = [
+    (DOPPLER_FIX, "reason", {int(r): r.name for r in NoFixReason if r}),
+    (LOCALIZER_STATE, "status", {int(s): s.name for s in Status}),
+    (LOCALIZER_STATE, "reason", {int(r): r.name for r in ProtectionReason}),
+    (LOCALIZER_STATE, "excluded", {1 << sensor: sensor.name for sensor in Sensor}),
+    (BUS_TREND, "kind", dict(enumerate(KINDS, start=1))),
+    (BUS_STATE, "kind", {0: "none"} | dict(enumerate(KINDS, start=1))),
+]
+
+
+@pytest.mark.parametrize(
+    ("topic", "column", "values"), ENUMERATIONS, ids=lambda x: getattr(x, "pattern", None)
+)
+def test_an_enumeration_is_told_value_by_value(
+    topic: Topic, column: str, values: dict[int, str]
+) -> None:
+    text = topic.column_texts[topic.index[column]].lower()
+    told = {int(number): name for number, name in re.findall(r"(?<![-\w])(\d+) ([a-z ]+)", text)}
+    for number, name in values.items():
+        assert told[number].strip().startswith(name.lower().replace("_", " ")), name
+    assert told.keys() - values.keys() <= {0}, "a value that there is not"
+
+
+def test_the_threats_stand_in_their_own_order() -> None:
+    assert STRIKES.columns[1:] == tuple(threat.value for threat in Threat)
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ from rail_corridor.figures.track_code import (
 from rail_corridor.figures.track_code_errors import bound, chain_losses
 from rail_corridor.figures.train_bus import smallest_ohm
 from rail_corridor.plotting import FigureSpec
-from rail_corridor.recording.mcap_file import RecordingFile
+from rail_corridor.recording.parts import Recording
 from rail_corridor.report.from_recording import run_of
 from rail_signals.ranging.bounds import two_way_range_variance_bound
 from rail_signals.ranging.signal import RangingSignal
@@ -243,7 +243,7 @@ def test_the_page_shows_every_figure(tmp_path: Path) -> None:
 def test_figures_of_a_run(made_up: Callable[..., Any], tmp_path: Path) -> None:
     made = made_up()
     made.write()
-    with RecordingFile(made.path) as file:
+    with Recording(made.path) as file:
         run = run_of(file)
     pictures = run_figures.figure_specs_of(run)
     assert set(pictures) == {"run_time_distance", "run_position_error", "run_handovers"}

@@ -10,7 +10,8 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from rail_corridor.equipment.registry import kind_of
 from rail_corridor.errors import InputError
-from rail_corridor.recording.mcap_file import RecordedChannel, RecordingFile
+from rail_corridor.recording.mcap_file import RecordedChannel
+from rail_corridor.recording.parts import Recording
 from rail_corridor.recording.replay import ReplayOptions, offers_of, ordered, span_of
 from rail_msgs_py.topics.qos_text import offered_profiles
 from rail_msgs_py.topics.tick import READY
@@ -30,13 +31,13 @@ def published(
     run: Any, *wanted: str, start_s: float = 0.0, duration_s: float | None = None
 ) -> list[Any]:
     """Return what is published, in its order."""
-    with RecordingFile(run.path) as file:
+    with Recording(run.path) as file:
         for _ in file.chunks(lambda _: False):
             pass
         offers = offers_of(file.channels, wanted)
         options = ReplayOptions(1.0, start_s, duration_s, wanted)
         begin_ns, end_ns = span_of(file, options)
-    with RecordingFile(run.path) as file:
+    with Recording(run.path) as file:
         return list(ordered(file, offers, begin_ns, end_ns))
 
 
@@ -82,7 +83,7 @@ def test_topics_that_are_asked_for_go_with_the_clock(run: Any) -> None:
 
 
 def test_profiles_are_those_of_the_run(run: Any) -> None:
-    with RecordingFile(run.path) as file:
+    with Recording(run.path) as file:
         for _ in file.chunks():
             pass
         offers = offers_of(file.channels, ())

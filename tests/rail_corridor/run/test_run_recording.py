@@ -14,6 +14,10 @@ import pytest
 from rail_corridor.errors import InputError
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.mcap_file import RecordingFile
+from rail_corridor.recording.part_names import part_path, parts_of
+from rail_corridor.recording.parts import Recording
+from rail_corridor.recording.topic_selection import TopicSelection
+from rail_corridor.run.options import RecordOptions
 from rail_corridor.run.run_recording import RunRecording
 from rail_msgs_py.stamps import clock_to_cdr
 from rail_msgs_py.topics.ranging import WRS_TX
@@ -58,7 +62,7 @@ def told(recording: RunRecording, ticks: int) -> int:
 def test_all_that_was_told_is_there_and_an_old_file_is_gone(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_bytes(b"old" * 1_000_000)
-    recording = RunRecording(path, (), [SCENARIO], {"begin": {"seed": "7"}})
+    recording = RunRecording(RecordOptions(path), (), [SCENARIO], {"begin": {"seed": "7"}})
     assert told(recording, 40) == 40
     recording.tell([Attachment("report.json", "application/json", b"{}")], {"end": {}})
     assert recording.finish() is None
@@ -74,7 +78,7 @@ def test_a_disk_that_fills_up_leaves_every_whole_chunk(
 ) -> None:
     path, room = tmp_path / "run.mcap", 5_000_000
     with no_file_larger_than(room):
-        recording = RunRecording(path, (), [SCENARIO], {})
+        recording = RunRecording(RecordOptions(path), (), [SCENARIO], {})
     begun_s = time.monotonic()
     ticks = told(recording, 2000)
     assert time.monotonic() - begun_s < PATIENCE_S
@@ -97,4 +101,44 @@ def test_a_disk_that_fills_up_leaves_every_whole_chunk(
 def test_what_cannot_be_written_is_one_line(tmp_path: Path, name: str, told_reason: str) -> None:
     (tmp_path / "folder.mcap").mkdir()
     with pytest.raises(InputError, match=f"--record: .*: {told_reason}"):
-        RunRecording(tmp_path / name, (), [], {})
+        RunRecording(RecordOptions(tmp_path / name), (), [], {})
+
+
+def test_it_is_divided_and_told_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    options = RecordOptions(path, split_bytes=1_000_000)
+    recording = RunRecording(options, (), [SCENARIO], {})
+    assert told(recording, 80) == 80
+    assert recording.finish() is None
+    parts = parts_of(path)
+    assert len(parts) > 2
+    assert recording.describe() == f"{path} and {len(parts) - 1} more, to {parts[-1]}"
+    with Recording(path) as file:
+        times = [message.log_time_ns for chunk in file.chunks() for message in chunk]
+    assert times == [tick * TICK_NS for tick in range(80) for _ in range(2)]
+    again = RunRecording(RecordOptions(path, split_bytes=10**9), (), [SCENARIO], {})
+    assert told(again, 3) == 3
+    assert again.finish() is None
+    assert parts_of(path) == [path]
+    assert again.describe() == str(path)
+
+
+def test_a_part_never_replaces_what_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    other = part_path(path, 1)
+    other.write_bytes(b"of somebody else")
+    with pytest.raises(InputError, match=r"--record-split: .*run_1\.mcap: is none of an"):
+        RunRecording(RecordOptions(path, split_bytes=1_000_000), (), [], {})
+    assert other.read_bytes() == b"of somebody else"
+    assert not path.exists()
+
+
+def test_what_is_not_selected_is_not_told(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    options = RecordOptions(path, TopicSelection(waveforms=False))
+    recording = RunRecording(options, (), [], {})
+    tap = recording.start()
+    assert tap(WRS_TX, "/wayside/wrs1/zone1/tx") is None
+    assert tap.select(WRS_TX, "/wayside/wrs1/zone1/tx") is None
+    assert tap(CLOCK, "/clock") is not None
+    assert recording.finish() is None

@@ -38,6 +38,7 @@ from rail_corridor.view.frame import Asked, Lists, frame
 from rail_corridor.view.live_state import LiveStateStore
 from rail_corridor.view.wanted import ARRAY, Wish
 from rail_msgs_py.table import Table, TableWriter
+from rail_msgs_py.topics.column import Column
 from rail_msgs_py.topics.qos import ESTIMATE, STREAM
 from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.topics.world import SCENARIO, STATE
@@ -46,12 +47,12 @@ TRAIN = "first"
 AXLES = Topic(
     *("/wayside/{section}/axle_counter/occupancy", Float64MultiArray, ESTIMATE, Table),
     *("axle_counter", "people", "Axles in a section."),
-    columns=("axles",),
+    table=(Column("axles", "number of axles in the section"),),
 )
 COUNTED = Topic(
     *("/{train}/axle_counter/count", Float64MultiArray, ESTIMATE, Table),
     *("axle_counter", "people", "Axles of a train."),
-    columns=("axles", "front_m"),
+    table=(Column("axles", "number of axles"), Column("front_m", "of the train")),
 )
 PULSES = Topic(
     *("/wayside/{head}/axle_counter/pulses", UInt8MultiArray, STREAM, None),

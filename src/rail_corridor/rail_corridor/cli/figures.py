@@ -61,10 +61,10 @@ def figures(
     of_run = [name for name in wanted if name in run_figures.FIGURES]
     available = dict(FIGURES)
     if recording is not None and of_run:
-        from rail_corridor.recording.mcap_file import RecordingFile
+        from rail_corridor.recording.parts import Recording
         from rail_corridor.report.from_recording import run_of
 
-        with RecordingFile(recording) as file:
+        with Recording(recording) as file:
             run = run_of(file)
         available |= run_figures.figure_specs_of(run)
     specs = {name: available[name] for name in wanted if name in available}

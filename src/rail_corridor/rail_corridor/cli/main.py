@@ -17,6 +17,13 @@ from rail_corridor.view.command import view
 
 from .figures import add_to as add_figures
 from .live import add_to as add_live
+from .recordings import (
+    NoWaveformsOption,
+    RecordOption,
+    RecordSplitOption,
+    RecordTopicsOption,
+    record_options,
+)
 from .recordings import add_to as add_recordings
 from .studies import add_to as add_studies
 from .usage import (
@@ -24,7 +31,6 @@ from .usage import (
     TrackOption,
     UsageError,
     check_choice,
-    check_library,
     check_writable,
 )
 from .workshop import add_to as add_workshop
@@ -141,10 +147,10 @@ def run(
             "--kill", help="Kill this node at this simulated time; repeatable.", metavar="NODE@S"
         ),
     ] = None,
-    record: Annotated[
-        Path | None,
-        typer.Option("--record", help="Record every topic.", metavar="FILE.mcap"),
-    ] = None,
+    record: RecordOption = None,
+    record_topics: RecordTopicsOption = None,
+    no_waveforms: NoWaveformsOption = False,
+    record_split: RecordSplitOption = None,
     allow_failures: Annotated[
         bool,
         typer.Option(
@@ -172,9 +178,7 @@ def run(
         raise UsageError(f"--timeout: {timeout}: must be from 0.5 to 3600 s")
     if report is not None:
         check_writable("--report", report)
-    if record is not None:
-        check_writable("--record", record)
-        check_library()
+    recorded = record_options(record, record_topics, no_waveforms, record_split)
     from rail_corridor.run.kills import parse_kill
 
     kills = tuple(parse_kill(text) for text in kill or ())
@@ -193,7 +197,7 @@ def run(
         timeout,
         tuple(external or ()),
         kills,
-        record,
+        recorded,
         rate > 0.0 if switches is None else switches,
         allow_failures,
     )

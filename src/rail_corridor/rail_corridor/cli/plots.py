@@ -48,12 +48,12 @@ def plot_recording(traces: Sequence[Trace], path: Path, out: Path | None) -> int
     ------
     InputError, UsageError
     """
-    from rail_corridor.recording.mcap_file import RecordingFile
+    from rail_corridor.recording.parts import Recording
 
     from .series import gather_from
 
     gatherer = Gatherer(traces)
-    with RecordingFile(path) as file:
+    with Recording(path) as file:
         gather_from(file, gatherer)
     if gatherer.span_s is None:
         raise InputError("nothing to plot was recorded", file=str(path))

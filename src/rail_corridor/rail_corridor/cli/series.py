@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 from rclpy.serialization import deserialize_message
 
 from rail_corridor.errors import InputError
-from rail_corridor.recording.mcap_file import RecordingFile
+from rail_corridor.recording.parts import Recording
 from rail_msgs_py.message_definition import message_class
 
 from .fields import Record, RecordReader
@@ -172,7 +172,7 @@ def panels_of(series: Iterable[Series]) -> dict[str, list[Series]]:
     return panels
 
 
-def gather_from(file: RecordingFile, gatherer: Gatherer) -> None:
+def gather_from(file: Recording, gatherer: Gatherer) -> None:
     """Gather from a recording; reads it to its end.
 
     Raises
@@ -182,11 +182,12 @@ def gather_from(file: RecordingFile, gatherer: Gatherer) -> None:
     """
     kinds: dict[str, Any] = {}
     for chunk in file.chunks(lambda channel: channel.topic in gatherer.topics):
-        for channel, log_time_ns, raw in chunk:
+        for recorded in chunk:
+            channel = recorded.channel
             if channel.topic not in kinds:
                 kinds[channel.topic] = _class_of(channel.topic, channel.type)
-            message = deserialize_message(raw, kinds[channel.topic])
-            gatherer.take(channel.topic, message, log_time_ns * 1e-9)
+            message = deserialize_message(recorded.data, kinds[channel.topic])
+            gatherer.take(channel.topic, message, recorded.log_time_ns * 1e-9)
     # Processes are recorded side by side.
     for each in gatherer.series:
         each.sort()

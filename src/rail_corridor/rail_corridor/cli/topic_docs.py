@@ -31,6 +31,13 @@ The tables are made from the code by `python docs/refresh.py`, or all of this fi
 running graph.
 """
 
+_COLUMNS = """\
+## Columns of tables
+
+A table is one row or more of numbers, in the order of these columns; their names travel in the
+layout of each message (`rail_msgs_py/table.py`). A count is of what happened up to the stamp.
+"""
+
 _PARAMETERS = """\
 ## Parameters
 
@@ -48,8 +55,8 @@ def document() -> str:
 
 
 def tables() -> str:
-    """Return the generated part: topics, quality of service, parameters of every node."""
-    parts = [topic_table(), qos_table(), _PARAMETERS]
+    """Return the generated part: topics, columns, quality of service, parameters of nodes."""
+    parts = [topic_table(), column_tables(), qos_table(), _PARAMETERS]
     return "\n".join([*parts, *(parameter_table(kind) for kind in node_kinds())])
 
 
@@ -83,17 +90,33 @@ def topic_table() -> str:
     for topic in table:
         sender, readers = ends_of(topic)
         view = f"`{topic.view.__name__}`" if topic.view else ""
-        name = topic.pattern.replace("{", "<").replace("}", ">")
         rows.append(
-            f"| `{name}` | `{type_name(topic.type)}` | {view} | {name_of(topic.qos)}"
-            f" | {sender} | {readers} |"
+            f"| `{_shown(topic.pattern)}` | `{type_name(topic.type)}` | {view}"
+            f" | {name_of(topic.qos)} | {sender} | {readers} |"
         )
     rows.append("\nWhat they carry:\n")
-    rows += [
-        f"- `{topic.pattern.replace('{', '<').replace('}', '>')}`: {topic.text}"
-        for topic in topics()
-    ]
+    rows += [f"- `{_shown(topic.pattern)}`: {topic.text}" for topic in topics()]
     return "\n".join(rows) + "\n"
+
+
+def column_tables() -> str:
+    """Return a Markdown table of the columns of each topic that is a table."""
+    parts = [_COLUMNS]
+    for topic in topics():
+        if topic.table:
+            rows = [
+                f"### `{_shown(topic.pattern)}`\n",
+                "| Column | Unit | Meaning |",
+                "|---|---|---|",
+                *(f"| `{_shown(each.name)}` | {each.unit} | {each.text} |" for each in topic.table),
+            ]
+            parts.append("\n".join(rows) + "\n")
+    return "\n".join(parts)
+
+
+def _shown(name: str) -> str:
+    """A name with its placeholders as the documents write them."""
+    return name.replace("{", "<").replace("}", ">")
 
 
 def qos_table() -> str:

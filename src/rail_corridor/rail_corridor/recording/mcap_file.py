@@ -43,11 +43,15 @@ class RecordedChannel:
 
 
 class RecordedMessage(NamedTuple):
-    """One message: its topic, the time it was recorded at, its serialised form."""
+    """One message: its topic, the time it was recorded at, its serialised form, its number.
+
+    The numbers of a topic rise from 1 on, where the writer counts at all.
+    """
 
     channel: RecordedChannel
     log_time_ns: int
     data: bytes
+    sequence: int = 0
 
 
 class _Damaged(Exception):
@@ -91,6 +95,11 @@ class RecordingFile:
         self._stream.close()
 
     @property
+    def holds_messages(self) -> bool:
+        """Whether a message has been read."""
+        return self._count > 0
+
+    @property
     def channels(self) -> list[RecordedChannel]:
         """Topics that have been found so far."""
         return list(self._channels.values())
@@ -130,7 +139,7 @@ class RecordingFile:
                 continue
             if len(body) < _MESSAGE.size:
                 raise _Damaged("a message is shorter than its head")
-            number, _, log_time_ns, _ = _MESSAGE.unpack_from(body)
+            number, sequence, log_time_ns, _ = _MESSAGE.unpack_from(body)
             if number not in chosen:
                 if number not in self._channels:
                     raise _Damaged(f"a message of channel {number}, which there is not")
@@ -144,7 +153,7 @@ class RecordingFile:
             known = chosen[number]
             if known is None:
                 continue
-            yield RecordedMessage(known, log_time_ns, bytes(body[_MESSAGE.size :]))
+            yield RecordedMessage(known, log_time_ns, bytes(body[_MESSAGE.size :]), sequence)
 
     def _advance(self) -> tuple[int, int, bytes] | None:
         """Read up to the next record that holds messages; None at the end."""

@@ -27,6 +27,7 @@ from .frames import (
     channel_frame,
     head,
 )
+from .topic_selection import EVERY_TOPIC, TopicSelection
 
 #: Handed over at least this often, in bytes and in messages.
 _MOST_BYTES: Final = 256 * 1024
@@ -49,6 +50,8 @@ class PipeTap:
         process may be killed; otherwise a tick at a time, which costs a third.
     besides : frozenset of str
         Topics of which the publishers here do not tell, as they are heard otherwise.
+    selection : TopicSelection
+        Of the others nothing is told.
     stall_s : float, optional
         Wall time after which a recorder that takes nothing is given up; never if not given.
     """
@@ -59,11 +62,12 @@ class PipeTap:
         *,
         at_once: bool = False,
         besides: frozenset[str] = frozenset(),
+        selection: TopicSelection = EVERY_TOPIC,
         stall_s: float | None = None,
     ) -> None:
         os.set_blocking(fd, False)
         self._fd = fd
-        self._besides = besides
+        self._besides, self._selection = besides, selection
         self._stall_s = stall_s
         self._most = 0 if at_once else _MOST_BYTES
         self._parts: list[bytes] = []
@@ -74,7 +78,11 @@ class PipeTap:
 
     def __call__(self, topic: Topic, name: str) -> Callable[[bytes], None] | None:
         """Sink of a publisher; None for one that does not tell."""
-        return None if name in self._besides else self.open(topic, name)
+        return None if name in self._besides else self.select(topic, name)
+
+    def select(self, topic: Topic, name: str) -> Callable[[bytes], None] | None:
+        """Function that tells the messages of a topic; None for one that is not recorded."""
+        return self.open(topic, name) if self._selection.takes(topic, name) else None
 
     def open(self, topic: Topic, name: str) -> Callable[[bytes], None]:
         """Function that tells the messages of a topic."""

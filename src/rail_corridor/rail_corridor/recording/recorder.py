@@ -17,6 +17,7 @@ from typing import BinaryIO, Final
 
 from .frames import Attachment, FrameReader
 from .mcap_recorder import McapRecorder, Source
+from .part_names import Split, part_path
 
 #: A chunk that nothing was added to for so long is closed.
 _IDLE_S: Final = 1.0
@@ -30,6 +31,7 @@ def record(
     pipes: Iterable[int],
     attachments: Iterable[Attachment],
     metadata: dict[str, dict[str, str]],
+    split: Split | None = None,
 ) -> None:
     """Write a recording until every pipe is closed; runs in the process of the recorder.
 
@@ -37,15 +39,17 @@ def record(
     """
     asked: list[float] = []
     signal.signal(signal.SIGTERM, lambda *_: asked.append(time.monotonic()))
+    recorder: McapRecorder | None = None
     try:
-        recorder = McapRecorder(stream, attachments, metadata)
+        recorder = McapRecorder(stream, attachments, metadata, split)
         try:
             _drain(recorder, pipes, asked)
         finally:
             recorder.close()
-            stream.close()
+            recorder.stream.close()
     except OSError as error:
-        print(f"rail: {path}: {error.strerror or error}", file=sys.stderr, flush=True)
+        at = part_path(path, recorder.part if recorder is not None else 0)
+        print(f"rail: {at}: {error.strerror or error}", file=sys.stderr, flush=True)
         os._exit(1)
 
 

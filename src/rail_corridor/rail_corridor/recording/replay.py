@@ -31,7 +31,8 @@ from rail_msgs_py.topics.qos import LATCHED
 from rail_msgs_py.topics.qos_text import profile_from
 from rail_msgs_py.topics.tick import CLOCK
 
-from .mcap_file import RecordedChannel, RecordedMessage, RecordingFile
+from .mcap_file import RecordedChannel, RecordedMessage
+from .parts import Recording
 
 #: Wall time without a new subscriber after which those that are there have been found.
 SETTLED_S: Final = 1.0
@@ -114,7 +115,7 @@ def replay(path: Path, options: ReplayOptions, console: Console) -> int:
     ------
     InputError
     """
-    with RecordingFile(path) as file:
+    with Recording(path) as file:
         for _ in file.chunks(lambda _: False):
             pass
         try:
@@ -124,12 +125,12 @@ def replay(path: Path, options: ReplayOptions, console: Console) -> int:
             raise error.located("" if error.field.startswith("--") else str(path)) from None
         if file.cut_at is not None:
             console.print(
-                f"{path} is cut short at byte {file.cut_at}, {file.last_ns * 1e-9:.1f} s",
+                f"{file.last_path} is cut short at byte {file.cut_at}, {file.last_ns * 1e-9:.1f} s",
                 soft_wrap=True,
                 highlight=False,
             )
     discover_on("this")
-    with sole_corridor(), _until_stopped() as stop, RecordingFile(path) as file:
+    with sole_corridor(), _until_stopped() as stop, Recording(path) as file:
         messages = ordered(file, offers, start_ns, end_ns)
         with _publishers(offers, stop) as publish:
             _publish_paced(messages, publish, options.rate, (start_ns, end_ns), stop, console)
@@ -175,7 +176,7 @@ def _offer_of(channel: RecordedChannel) -> Offer:
     return Offer(kind, profile, latched and (known is None or known.qos is LATCHED))
 
 
-def span_of(file: RecordingFile, options: ReplayOptions) -> tuple[int, int]:
+def span_of(file: Recording, options: ReplayOptions) -> tuple[int, int]:
     """First and last instant [ns] to publish, of a file that has been read."""
     start_ns = max(round(options.start_s * 1e9), file.first_ns)
     if start_ns > file.last_ns:
@@ -187,7 +188,7 @@ def span_of(file: RecordingFile, options: ReplayOptions) -> tuple[int, int]:
 
 
 def ordered(
-    file: RecordingFile, offers: Mapping[str, Offer], start_ns: int, end_ns: int
+    file: Recording, offers: Mapping[str, Offer], start_ns: int, end_ns: int
 ) -> Iterator[RecordedMessage]:
     """Yield what is to be published, in the order of time; at each instant what is latched first.
 

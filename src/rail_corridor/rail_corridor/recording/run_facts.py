@@ -9,6 +9,8 @@ from typing import Final
 
 from rail_corridor.errors import InputError
 
+from .topic_selection import EVERY_TOPIC, TopicSelection
+
 #: Names of the two records.
 BEGIN: Final = "rail_corridor.begin"
 END: Final = "rail_corridor.end"
@@ -22,16 +24,19 @@ class RunStart:
     seed: int
     nodes: int
     processes: int
+    selection: TopicSelection = EVERY_TOPIC
 
     def values(self) -> dict[str, str]:
         """As values of a record."""
-        return {key: str(value) for key, value in vars(self).items()}
+        facts = {key: str(value) for key, value in vars(self).items() if key != "selection"}
+        return facts | self.selection.values()
 
     @classmethod
     def of(cls, values: Mapping[str, str]) -> RunStart:
         """Inverse of `values`; raises InputError."""
         numbers = {key: _count(values, key, BEGIN) for key in ("seed", "nodes", "processes")}
-        return cls(values.get("scenario", ""), **numbers)
+        selection = TopicSelection.of(values)
+        return cls(values.get("scenario", ""), **numbers, selection=selection)
 
 
 @dataclass(frozen=True)

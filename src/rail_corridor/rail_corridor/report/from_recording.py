@@ -20,7 +20,8 @@ from rich.console import Console
 from rail_corridor.errors import InputError
 from rail_corridor.loading.scenario_files import scenario_from
 from rail_corridor.plan.plan import Plan, make_plan
-from rail_corridor.recording.mcap_file import RecordedChannel, RecordedMessage, RecordingFile
+from rail_corridor.recording.mcap_file import RecordedChannel, RecordedMessage
+from rail_corridor.recording.parts import Recording
 from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.message_definition import type_name
@@ -33,11 +34,12 @@ REPORT = "report.json"
 
 def show_report(path: Path, json_path: Path | None, console: Console) -> int:
     """Print the report of a recording, and write it; returns the exit code."""
-    with RecordingFile(path) as file:
+    with Recording(path) as file:
         report = report_of(file)
     if file.cut_at is not None:
         console.print(
-            f"{path} is cut short at byte {file.cut_at}: this is the report of what is there",
+            f"{file.last_path} is cut short at byte {file.cut_at}: "
+            "this is the report of what is there",
             soft_wrap=True,
             highlight=False,
         )
@@ -62,7 +64,7 @@ class RecordedRun(NamedTuple):
     run_end: RunEnd | None
 
 
-def report_of(file: RecordingFile) -> dict[str, Any]:
+def report_of(file: Recording) -> dict[str, Any]:
     """Report of a recording; reads it to its end.
 
     Raises
@@ -84,7 +86,7 @@ def report_of(file: RecordingFile) -> dict[str, Any]:
     )
 
 
-def run_of(file: RecordingFile) -> RecordedRun:
+def run_of(file: Recording) -> RecordedRun:
     """What a recording tells of its run; reads it to its end, raises as `report_of`."""
     name = str(file.path)
     with tempfile.TemporaryDirectory(prefix="rail_corridor_") as directory:
@@ -93,6 +95,7 @@ def run_of(file: RecordingFile) -> RecordedRun:
             run_start = RunStart.of(file.metadata.get(BEGIN, {}))
             plan = make_plan(scenario, Path(directory))
             intake = Intake(plan)
+            _check_complete(file, run_start, intake)
             _feed(file, intake)
             run_end = RunEnd.of(file.metadata[END]) if END in file.metadata else None
         except InputError as error:
@@ -125,7 +128,7 @@ def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any] | None) -> li
     return report
 
 
-def _reported(file: RecordingFile) -> dict[str, Any] | None:
+def _reported(file: Recording) -> dict[str, Any] | None:
     """The report that the run made itself, None if it did not come to that."""
     for attachment in file.attachments:
         if attachment.name == REPORT:
@@ -137,7 +140,20 @@ def _reported(file: RecordingFile) -> dict[str, Any] | None:
     return None
 
 
-def _feed(file: RecordingFile, intake: Intake) -> None:
+def _check_complete(file: Recording, run_start: RunStart, intake: Intake) -> None:
+    """Raise InputError for a recording that does not hold all that a report reads."""
+    if file.number:
+        raise InputError(f"is part {file.number} of a recording: name the first, with no number")
+    selection = run_start.selection
+    names = [each.name for each in intake.readers if not selection.takes(each.topic, each.name)]
+    if names:
+        more = f" and {len(names) - 1} more topics" if len(names) > 1 else ""
+        raise InputError(
+            f"recorded with {selection.describe()}, without {names[0]}{more} that a report reads",
+        )
+
+
+def _feed(file: Recording, intake: Intake) -> None:
     """Give every message that the report reads to its reader."""
     readers = {reader.name: reader for reader in intake.readers}
 

@@ -37,7 +37,7 @@ class ExternalTrafficRecorder(CorridorNode):
     external_nodes : iterable of str
         Full names of their nodes.
     open_sink : callable of kind of topic and name
-        Opens what takes the messages of a topic.
+        Opens what takes the messages of a topic; None for one that is not recorded.
     shared : iterable of Topic
         Topics on which both they and our nodes publish: all of it is told by this node.
     """
@@ -45,7 +45,7 @@ class ExternalTrafficRecorder(CorridorNode):
     def __init__(
         self,
         external_nodes: Iterable[str],
-        open_sink: Callable[[Topic, str], Sink],
+        open_sink: Callable[[Topic, str], Sink | None],
         shared: Iterable[Topic],
         *,
         context: Any,
@@ -113,6 +113,8 @@ class ExternalTrafficRecorder(CorridorNode):
     def _hear(self, topic: Topic, name: str) -> None:
         sink = self._open_sink(topic, name)
         self._known_topics.add(name)
+        if sink is None:
+            return
         everything = QoSProfile(
             history=HistoryPolicy.KEEP_ALL,
             reliability=topic.qos.reliability,

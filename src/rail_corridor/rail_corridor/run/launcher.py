@@ -37,11 +37,12 @@ from .external_traffic import ExternalTrafficRecorder
 from .host import destroy_nodes, load_for_nodes, make_context, make_nodes, run_nodes
 from .kernels import compile_before_the_first_run
 from .kills import FaultInjector, check_kills, killed_nodes
-from .options import RunOptions, check_recording, default_placement
+from .options import RecordOptions, RunOptions, check_recording, default_placement
 from .other_half import ELSEWHERE, OtherHalf
 from .parameter_services import ParameterServicesOnDemand
 from .processes import ProcessGroup, remove_orphaned_segments
 from .progress import progress_of
+from .recorded_topics import check_recorded_topics
 
 if TYPE_CHECKING:
     from rail_corridor.equipment.node_spec import NodeSpec
@@ -69,7 +70,7 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
         signal that ended it.
     """
     if options.record is not None:
-        check_recording(options.record, options.only)
+        check_recording(options.record.path, options.only)
     discover_on("all" if options.only else "this")
     directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
     try:
@@ -85,6 +86,7 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
             observers=(REPORT, *external_nodes),
         )
         check_external(plan, options.external)
+        check_recorded_topics(options, plan)
         compile_before_the_first_run(console)
         with sole_corridor(options.only):
             launched = _LaunchedRun(scenario, options, plan, console)
@@ -173,14 +175,15 @@ class _LaunchedRun:
         tap = self._recording.tap_of(name) if self._recording else None
         run_nodes(specs, tap, switches=self._options.switches, report_reads=self._report_reads)
 
-    def _record(self, path: Path, nodes: int) -> RunRecording:
+    def _record(self, options: RecordOptions, nodes: int) -> RunRecording:
         """Start the recorder, before any other process and before ROS."""
         from .run_recording import RunRecording
 
         plan = self._plan
-        run_start = RunStart(plan.scenario, plan.seed, nodes, len(self._groups))
+        processes = len(self._groups)
+        run_start = RunStart(plan.scenario, plan.seed, nodes, processes, options.selection)
         return RunRecording(
-            path,
+            options,
             () if self._here else self._groups,
             files_of(self._scenario),
             {BEGIN: run_start.values()},
@@ -226,7 +229,7 @@ class _LaunchedRun:
             others = [spec.name for spec in self._plan.nodes if spec.name not in self._ours]
             from .run_recording import SHARED
 
-            recorder = ExternalTrafficRecorder(others, tap.open, SHARED, context=context)
+            recorder = ExternalTrafficRecorder(others, tap.select, SHARED, context=context)
             nodes.append(recorder)
             if self._options.only == "report":  # the world elsewhere knows of the report alone
                 self._observer.await_connection(lambda: recorder.connected)
@@ -337,9 +340,9 @@ class _LaunchedRun:
             self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)
 
     def _tell_trouble(self, trouble: str | None, so: str = "") -> None:
-        if trouble is not None:
+        if trouble is not None and self._recording is not None:
             self._recording_failed = True
-            line = f"recording to {self._options.record} has failed: {trouble}{so}"
+            line = f"recording to {self._recording.path} has failed: {trouble}{so}"
             self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)
 
     def _report(self, nodes: int) -> dict[str, Any] | None:
@@ -375,7 +378,7 @@ class _LaunchedRun:
                 write_report(report, self._options.report)
                 self._console.print(f"report written to {self._options.report}")
         if self._recording is not None and not self._recording_failed:
-            self._console.print(f"recorded to {self._options.record}")
+            self._console.print(f"recorded to {self._recording.describe()}")
         if self._world_failed or (self._recording_failed and not self._signal):
             return 1
         if self._signal:

@@ -10,11 +10,30 @@ from typing import Any
 
 from rail_corridor.errors import InputError
 from rail_corridor.plan.plan import Part, Placement, Plan
+from rail_corridor.recording.topic_selection import EVERY_TOPIC, TopicSelection
 
 from .kills import Kill
 
 #: More processes than this to a core cost more than they show.
 MOST_PROCESSES_PER_CORE = 8
+
+
+@dataclass(frozen=True)
+class RecordOptions:
+    """What of a run is recorded, and where.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    selection : TopicSelection
+    split_bytes : int, optional
+        A file that has grown to so much is closed and another one begun; one file unless given.
+    """
+
+    path: Path
+    selection: TopicSelection = EVERY_TOPIC
+    split_bytes: int | None = None
 
 
 @dataclass(frozen=True)
@@ -28,7 +47,7 @@ class RunOptions:
     timeout_s: float = 30.0
     external: tuple[str, ...] = ()
     kills: tuple[Kill, ...] = ()
-    record: Path | None = None
+    record: RecordOptions | None = None
     switches: bool = False
     allow_failures: bool = False
     #: Of a run in one process: is given its nodes and their context before they are spun. The

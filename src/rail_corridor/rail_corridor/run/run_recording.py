@@ -6,18 +6,21 @@ import contextlib
 import fcntl
 import os
 import time
+import uuid
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Final
 
 from rail_corridor.equipment.registry import topics
 from rail_corridor.errors import InputError
 from rail_corridor.recording.frames import Attachment, attachment_frame, metadata_frame
+from rail_corridor.recording.part_names import Split, part_path, parts_of
+from rail_corridor.recording.parts import remove_old_parts
 from rail_corridor.recording.pipe_tap import CLOSED, PipeTap
 from rail_corridor.recording.recorder import record
 from rail_msgs_py.message_definition import message_definition, type_name
 from rail_msgs_py.topics.tick import TOPICS
 
+from .options import RecordOptions
 from .processes import ProcessGroup
 
 #: The process of the launcher itself, where the report is; no other has an empty name.
@@ -40,8 +43,8 @@ class RunRecording:
 
     Parameters
     ----------
-    path : Path
-        File to write; an old one is replaced.
+    options : RecordOptions
+        What is recorded, and where; an old file is replaced, and so are its parts if it is split.
     processes : iterable of str
         Names of the processes of the run, beside the launcher's.
     attachments, metadata
@@ -53,19 +56,25 @@ class RunRecording:
     Raises
     ------
     InputError
-        If the file cannot be written, or a message type has no definition here.
+        If the file cannot be written, a message type has no definition here, or a part would
+        replace a file that is none.
     """
 
     def __init__(
         self,
-        path: Path,
+        options: RecordOptions,
         processes: Iterable[str],
         attachments: Iterable[Attachment],
         metadata: Mapping[str, Mapping[str, str]],
         *,
         external_nodes: bool = False,
     ) -> None:
-        self.path = path
+        self._options = options
+        self.path = path = options.path
+        split = None
+        if options.split_bytes is not None:
+            remove_old_parts(path)
+            split = Split(path, options.split_bytes, uuid.uuid4().hex)
         try:
             for kind in {type_name(topic.type) for topic in topics()}:
                 message_definition(kind)
@@ -88,7 +97,7 @@ class RunRecording:
         def work() -> None:
             for write in self._writes.values():
                 os.close(write)
-            record(path, stream, self._reads, attachments, facts)
+            record(path, stream, self._reads, attachments, facts, split)
 
         self._child = self._group.start("recorder", work)
         stream.close()
@@ -102,14 +111,24 @@ class RunRecording:
         for name, write in self._writes.items():
             if name != process:
                 os.close(write)
-        return PipeTap(self._writes[process], at_once=True, besides=self._besides)
+        return PipeTap(
+            self._writes[process],
+            at_once=True,
+            besides=self._besides,
+            selection=self._options.selection,
+        )
 
     def start(self) -> PipeTap:
         """Tap of the launcher, once all other processes have been started."""
         for name, write in self._writes.items():
             if name != LAUNCHER:
                 os.close(write)
-        self.tap = PipeTap(self._writes[LAUNCHER], besides=self._besides, stall_s=_STALL_S)
+        self.tap = PipeTap(
+            self._writes[LAUNCHER],
+            besides=self._besides,
+            selection=self._options.selection,
+            stall_s=_STALL_S,
+        )
         return self.tap
 
     def trouble(self) -> str | None:
@@ -128,6 +147,13 @@ class RunRecording:
             self.tap.send(attachment_frame(attachment))
         for name, values in metadata.items():
             self.tap.send(metadata_frame(name, dict(values)))
+
+    def describe(self) -> str:
+        """The files that were written, in words."""
+        more = 0 if self._options.split_bytes is None else len(parts_of(self.path)) - 1
+        return f"{self.path}" + (
+            f" and {more} more, to {part_path(self.path, more)}" if more else ""
+        )
 
     def finish(self) -> str | None:
         """Wait until the file is complete, the other processes having ended; say what failed."""

@@ -134,7 +134,7 @@ class SteppedCorridor:
         #: Nodes that were killed; what was under way to one would find no handle if it were gone.
         self.dead: list[Any] = []
         #: Spins all nodes of this process.
-        # rclpy lets faults of the process be told on standard error, which a test may have replaced.
+        # rclpy has crashes told on standard error, which a test may have replaced.
         with contextlib.redirect_stderr(sys.__stderr__):
             self.executor = EventsExecutor(context=self.context)
         self.observer = Observer(

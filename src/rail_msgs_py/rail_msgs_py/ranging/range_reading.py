@@ -2,6 +2,8 @@
 
 ``+inf``: no signal found. ``nan``: a signal is there but the reading must not be used
 (two trains in the zone, or a jammer). ``min_range``/``max_range`` are the unambiguous interval.
+``radiation_type`` is INFRARED, of the two that are defined the electromagnetic one; the field of
+view is 0: the distance is that along the axis of the frame, the zone.
 """
 
 from __future__ import annotations
@@ -59,8 +61,9 @@ class RangeReading:
         message = Range()
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(self.stamp_ns, NANOSECONDS)
         message.header.frame_id = self.zone
-        # Neither ULTRASOUND nor INFRARED: the type has no constant for radio.
-        message.radiation_type = 255
+        # The type has no constant for radio, and a tool that switches over those that it has must
+        # find one of them: the electromagnetic one is the nearer.
+        message.radiation_type = Range.INFRARED
         message.min_range = self.min_range_m
         message.max_range = self.max_range_m
         message.range = self.range_m

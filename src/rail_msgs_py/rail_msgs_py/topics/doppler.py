@@ -11,6 +11,7 @@ from rail_msgs_py.position import Position
 from rail_msgs_py.table import Table
 from rail_msgs_py.waveform import Waveform
 
+from .column import Column
 from .qos import ESTIMATE, STREAM
 from .topic import Topic
 
@@ -41,9 +42,19 @@ DOPPLER_FIX: Final = Topic(
     "localizer, people, the report",
     "Position and speed from the shifts of the reference tones with their covariance, or why "
     "there is none; tones found, and the offset of the receiver.",
-    columns=(
-        *("reason", "chainage_m", "speed_mps"),
-        *("chainage_m2", "chainage_speed_m2ps", "speed_m2ps2", "tones", "offset_hz"),
+    table=(
+        Column(
+            "reason",
+            "why there is no fix: 0 there is one, 1 too few stations, 2 standstill, 3 geometry, "
+            "4 ambiguous, 5 inconsistent, 6 off track",
+        ),
+        Column("chainage_m", "of the antenna on the track of the train, NaN without a fix"),
+        Column("speed_mps", "positive towards greater chainage, NaN without a fix"),
+        Column("chainage_m2", "variance of the chainage, NaN without a fix"),
+        Column("chainage_speed_m2ps", "covariance of chainage and speed, NaN without a fix"),
+        Column("speed_m2ps2", "variance of the speed, NaN without a fix"),
+        Column("tones", "number of reference tones found in the tick, 0 or more"),
+        Column("offset_hz", "by how much the receiver's own frequency is off, NaN without a fix"),
     ),
     awaited=True,
 )

@@ -13,6 +13,7 @@ from rail_msgs_py.ranging.range_reading import RangeReading
 from rail_msgs_py.table import Table
 from rail_msgs_py.waveform import Waveform
 
+from .column import Column
 from .qos import ESTIMATE, STREAM
 from .topic import Topic
 
@@ -25,7 +26,26 @@ LINKS: Final = Topic(
     "the report",
     "The truth of the links of each train: carrier-to-noise ratio per sample of what its "
     "transponder and its station received.",
-    columns=("snr_down", "snr_up", "downlink_channel", "uplink_channel"),
+    table=(
+        Column(
+            "snr_down",
+            "ratio of carrier to noise power per sample, linear, of what the train's transponder "
+            "received; 0 if it did not answer",
+        ),
+        Column(
+            "snr_up",
+            "the same of what the station received of the answer; 0 if the train was not its "
+            "strongest source",
+        ),
+        Column(
+            "downlink_channel",
+            "number of the channel that the train answers to, 0 if it does not answer",
+        ),
+        Column(
+            "uplink_channel",
+            "number of the channel that the train answers on, 0 if it does not answer",
+        ),
+    ),
 )
 WRS_TX: Final = Topic(
     "/wayside/{site}/{zone}/tx",
@@ -53,7 +73,8 @@ RANGE: Final = Topic(
     RangeReading,
     "wrs",
     "zone_controller",
-    "Range to the train in the zone with its variance; inf = no signal, nan = unusable.",
+    "Range to the train in the zone with its variance; inf = no signal, nan = unusable. Its "
+    "radiation type is INFRARED, as the message has none for radio.",
     below_owner=2,
 )
 VRS_RX: Final = Topic(
@@ -82,6 +103,15 @@ VRS_CHANNEL: Final = Topic(
     "vrs",
     "people, the report",
     "Channel in force after the tick, and the level on each downlink channel.",
+    table=(
+        Column("downlink", "number of the downlink channel in force, 0 before the first"),
+        Column("uplink", "number of the uplink channel in force, 0 before the first"),
+        Column(
+            "level_{channel}_dbm",
+            "level of the tone received on each downlink channel, minus infinity where none is "
+            "heard",
+        ),
+    ),
 )
 POSITION: Final = Topic(
     "/wayside/zone_controller/{train}/position",

@@ -9,6 +9,8 @@ from typing import Any
 
 from rclpy.qos import QoSProfile
 
+from .column import Column
+
 
 @dataclass(frozen=True)
 class Topic:
@@ -24,8 +26,8 @@ class Topic:
         How ``rail echo`` decodes it.
     sender, readers, text : str
         For the documentation.
-    columns : tuple of str
-        Of a table: names of its columns, each ending in its unit.
+    table : tuple of Column
+        Of a table: its columns.
     below_owner : int
         Levels of its name below that of the node that sends it.
     awaited : bool
@@ -43,10 +45,26 @@ class Topic:
     sender: str
     readers: str
     text: str
-    columns: tuple[str, ...] = ()
+    table: tuple[Column, ...] = ()
     below_owner: int = 1
     awaited: bool = False
     shared: bool = False
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns of the table; empty where the scenario says how many there are.
+
+        >>> from rail_msgs_py.topics.track_code import OCCUPANCY
+        >>> OCCUPANCY.columns
+        ('occupied', 'level_db')
+        """
+        names = tuple(column.name for column in self.table)
+        return () if any("{" in name for name in names) else names
+
+    @cached_property
+    def column_texts(self) -> tuple[str, ...]:
+        """What each of `columns` means."""
+        return tuple(column.text for column in self.table) if self.columns else ()
 
     @cached_property
     def index(self) -> dict[str, int]:

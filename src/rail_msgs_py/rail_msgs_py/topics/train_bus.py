@@ -9,8 +9,20 @@ from std_msgs.msg import Float64MultiArray
 from rail_msgs_py.table import Table
 from rail_msgs_py.waveform import Waveform
 
+from .column import Column
 from .qos import ESTIMATE, STREAM
 from .topic import Topic
+
+#: As `rail_signals.train_bus.faults.KINDS`, counted from 1.
+_KINDS: Final = (
+    "1 open, 2 short, 3 water ingress, 4 bad splice, 5 wrong cable, 6 missing shield ground, "
+    "7 loose connector"
+)
+#: As `rail_signals.train_bus.fault_words.size_of`.
+_SIZE: Final = (
+    "ohms of a short, a bad splice or a loose connector; change of capacitance (water ingress) or "
+    "of impedance (wrong cable, missing shield ground) as a fraction; NaN of an open"
+)
 
 BUS_TX: Final = Topic(
     "/{train}/bus_{end}/tx",
@@ -40,10 +52,25 @@ BUS_LINK: Final = Topic(
     "people, the report",
     "Counts of frames and bits after the tick, the measured margin, and at the head whether the "
     "end of the train is confirmed.",
-    #: Counts of a terminal since it was started; `bits` are those it knew before they came.
-    columns=(
-        *("sent", "received", "lost", "bits", "bit_errors", "ebn0_db"),
-        *("other_end", "other_end_age_s"),
+    table=(
+        Column("sent", "number of frames sent since the terminal was started"),
+        Column("received", "number of frames of the other end understood since then"),
+        Column("lost", "number of ticks since then in which none was understood"),
+        Column("bits", "number of bits received since then whose value was known beforehand"),
+        Column("bit_errors", "number of those that were wrong"),
+        Column(
+            "ebn0_db",
+            "energy of a bit over the noise density, as measured in the tick; NaN if it cannot be",
+        ),
+        Column(
+            "other_end",
+            "1 if the other end is known to be there, its last word being no older than the "
+            "time-out; else 0",
+        ),
+        Column(
+            "other_end_age_s",
+            "age of the last word of the other end, infinite before the first",
+        ),
     ),
 )
 REFLECTOMETER_TX: Final = Topic(
@@ -83,7 +110,22 @@ BUS_VERDICTS: Final = Topic(
     "people",
     "After each interpretation one row per car: length, impedance and attenuation, and whether "
     "they pass.",
-    columns=("length_m", "impedance_ohm", "attenuation_db", "passed"),
+    table=(
+        Column("length_m", "electrical length of the car's cable, NaN if it was not seen"),
+        Column(
+            "impedance_ohm",
+            "characteristic impedance of the car's cable, NaN if it was not seen",
+        ),
+        Column(
+            "attenuation_db",
+            "of a wave that passes the car, infinite if none does, NaN if it was not seen",
+        ),
+        Column(
+            "passed",
+            "1 if the car's cable passes the criteria of its profile, 0 if it fails or was not "
+            "seen",
+        ),
+    ),
 )
 BUS_TREND: Final = Topic(
     "/{train}/train_bus_monitor/trend",
@@ -92,8 +134,13 @@ BUS_TREND: Final = Topic(
     Table,
     "train_bus_monitor",
     "people",
-    "The measurements so far that found a fault, one row each: when, where and how large.",
-    columns=("time_s", "kind", "place_m", "size"),
+    "The last 64 measurements that found a fault, one row each: when, where and how large.",
+    table=(
+        Column("time_s", "simulated time of the measurement"),
+        Column("kind", f"of the fault: {_KINDS}"),
+        Column("place_m", "of the fault, along the cable from the head"),
+        Column("size", f"of the fault: {_SIZE}"),
+    ),
 )
 BUS_STATE: Final = Topic(
     "/{train}/train_bus_monitor/state",
@@ -103,11 +150,23 @@ BUS_STATE: Final = Topic(
     "train_bus_monitor",
     "people, the report",
     "What the monitor holds to be true after the tick: kind, place and size of a fault.",
-    #: `kind` counts `rail_signals.train_bus.faults.KINDS` from 1, 0 is none; `level` is 0 for all
-    #: is well, 1 for a fault that the bus still bears, 2 for a failed one.
-    columns=(
-        *("measurements", "interpretations", "level", "kind"),
-        *("place_m", "place_std_m", "size", "growth_per_s"),
+    table=(
+        Column("measurements", "number of measurements since the monitor was started"),
+        Column(
+            "interpretations",
+            "number of those that were interpreted, as they differed from the last that was or "
+            "that one was in doubt",
+        ),
+        Column(
+            "level",
+            "0 all is well, 1 a fault that the criteria of the profiles bear, 2 a cable that fails "
+            "them",
+        ),
+        Column("kind", f"of the fault that is held to be there: 0 none, {_KINDS}"),
+        Column("place_m", "of that fault, along the cable from the head; NaN without one"),
+        Column("place_std_m", "standard deviation of the place, NaN without a fault"),
+        Column("size", f"of that fault: {_SIZE}, or without a fault"),
+        Column("growth_per_s", "of the size, in its unit; NaN until it can be told"),
     ),
 )
 BUS_LINKS: Final = Topic(
@@ -119,7 +178,19 @@ BUS_LINKS: Final = Topic(
     "the report",
     "The truth of each train's bus: how far its fault has grown, and the energy of a bit over "
     "the noise density at both ends.",
-    columns=("grown", "ebn0_tail_db", "ebn0_head_db"),
+    table=(
+        Column("grown", "fraction of its full size that the fault has, 0 where there is none"),
+        Column(
+            "ebn0_tail_db",
+            "energy of a bit from the head over the noise density, at the tail; NaN if none was "
+            "sent",
+        ),
+        Column(
+            "ebn0_head_db",
+            "energy of a bit from the tail over the noise density, at the head; NaN if none was "
+            "sent",
+        ),
+    ),
 )
 
 #: In the order of the documentation.

@@ -10,6 +10,7 @@ from rail_msgs_py.table import Table
 from rail_msgs_py.train_radio.telegrams import Telegrams
 from rail_msgs_py.waveform import Waveform
 
+from .column import Column
 from .qos import ESTIMATE, STREAM
 from .topic import Topic
 
@@ -98,10 +99,25 @@ STRIKES: Final = Topic(
     "backbone",
     "the report",
     "The truth of the network: frames carried so far, and how often each threat has struck.",
-    #: After the first the threats of EN 50159:2010, 4.2.
-    columns=(
-        *("frames", "repetition", "deletion", "insertion", "resequencing", "corruption", "delay"),
-        "masquerade",
+    table=(
+        Column(
+            "frames",
+            "number of frames that came from both ends so far, without those of the intruder",
+        ),
+        Column("repetition", "number of times so far that a frame was sent again"),
+        Column("deletion", "number of times so far that a frame was taken away"),
+        Column("insertion", "number of times so far that a frame was added, random or altered"),
+        Column(
+            "resequencing",
+            "number of times so far that a frame was held back until later ones had passed",
+        ),
+        Column("corruption", "number of times so far that bits of a frame were changed"),
+        Column("delay", "number of times so far that a frame was held back for a random time"),
+        Column(
+            "masquerade",
+            "number of times so far that a frame came under a wrong identity: of another link, "
+            "sealed with another key, or thrown back to its sender",
+        ),
     ),
 )
 TRAIN_TELEGRAMS: Final = Topic(
@@ -130,7 +146,19 @@ RADIO_LINK: Final = Topic(
     "cbtc_radio",
     "people, the report",
     "Channel in force after the tick, the beacon's signal-to-noise ratio on it, bursts received.",
-    columns=("channel", "beacon_snr", "bursts"),
+    table=(
+        Column("channel", "number of the downlink channel in force, 0 if there is none"),
+        Column(
+            "beacon_snr",
+            "Es/N0 of the beacon on it behind the combiner, linear, mean over its symbols; 0 if "
+            "it was not heard",
+        ),
+        Column(
+            "bursts",
+            "number of bursts in the train's own slot that were detected in the tick, on all "
+            "channels",
+        ),
+    ),
 )
 CBTC_LINKS: Final = Topic(
     "/world/cbtc_medium/links",
@@ -141,7 +169,19 @@ CBTC_LINKS: Final = Topic(
     "the report",
     "The truth of each train's best link: its base station and the mean signal-to-noise ratio "
     "per sample at one antenna, both ways.",
-    columns=("base_index", "snr_down", "snr_up"),
+    table=(
+        Column(
+            "base_index",
+            "place of the base station with the strongest downlink in the order of the scenario, "
+            "from 0",
+        ),
+        Column(
+            "snr_down",
+            "mean signal-to-noise ratio of a sample at one antenna of the train, linear; 0 out "
+            "of reach",
+        ),
+        Column("snr_up", "the same at one antenna of the base station; 0 out of reach"),
+    ),
 )
 ATP_STATE: Final = Topic(
     "/{train}/atp/state",
@@ -152,9 +192,20 @@ ATP_STATE: Final = Topic(
     "people, the report",
     "Where the train believes its front to be, its authority and how old that is, and counts of "
     "frames accepted, lost and rejected.",
-    columns=(
-        *("accepted", "lost", "rejected"),
-        *("front_m", "uncertainty_m", "end_of_authority_m", "authority_age_s"),
+    table=(
+        Column("accepted", "number of frames accepted since the equipment was started"),
+        Column("lost", "number of frames found to be missing between those"),
+        Column(
+            "rejected",
+            "number of frames refused; a copy through a second base station does not count",
+        ),
+        Column("front_m", "chainage of the front as the train believes it, NaN if not known"),
+        Column("uncertainty_m", "half-width of the interval of the front, infinite if not known"),
+        Column(
+            "end_of_authority_m",
+            "chainage that the front must not pass, NaN without an authority",
+        ),
+        Column("authority_age_s", "time since the authority was sealed, infinite without one"),
     ),
 )
 REPORTS: Final = Topic(
@@ -165,10 +216,20 @@ REPORTS: Final = Topic(
     "zone_controller",
     "people, the report",
     "The location reports taken from a train in the tick, one row each, in their order.",
-    #: As in `rail_msgs_py.train_radio.train_report.LocationReport`, true at the first.
-    columns=(
-        *("sealed_s", "train", "segment", "offset_m", "direction", "speed_mps", "uncertainty_m"),
-        *("length_m", "integrity_confirmed", "position_valid"),
+    table=(
+        Column("sealed_s", "simulated time at which the report was true"),
+        Column("train", "number of the train in telegrams"),
+        Column("segment", "number of the track in telegrams"),
+        Column("offset_m", "chainage of the front on it"),
+        Column("direction", "1 if the train faces greater chainage, -1 if smaller"),
+        Column("speed_mps", "magnitude, rounded up"),
+        Column("uncertainty_m", "half-width of the interval of the front, rounded up"),
+        Column("length_m", "of the train, rounded up"),
+        Column("integrity_confirmed", "1 if the train knows itself to be whole, else 0"),
+        Column(
+            "position_valid",
+            "1 if segment, offset, direction and uncertainty mean anything, else 0",
+        ),
     ),
     below_owner=2,
 )
@@ -181,9 +242,23 @@ AUTHORITY: Final = Topic(
     "people, the report",
     "The movement authority given to a train, and counts of its reports accepted, lost and "
     "rejected.",
-    columns=(
-        *("end_of_authority_m", "limit_mps", "worst_rear_m", "report_age_s"),
-        *("accepted", "lost", "rejected"),
+    table=(
+        Column(
+            "end_of_authority_m",
+            "chainage that the front must not pass, NaN if the train has no authority",
+        ),
+        Column(
+            "limit_mps",
+            "speed limit in force over the length in which the train may be, NaN likewise",
+        ),
+        Column("worst_rear_m", "hindmost chainage at which the rear may be, NaN if not known"),
+        Column("report_age_s", "age of the newest report accepted, infinite before the first"),
+        Column("accepted", "number of reports accepted since the equipment was started"),
+        Column("lost", "number of reports found to be missing between those"),
+        Column(
+            "rejected",
+            "number of reports refused; a copy through a second base station does not count",
+        ),
     ),
     below_owner=2,
 )

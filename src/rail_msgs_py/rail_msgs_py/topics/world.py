@@ -11,6 +11,7 @@ from visualization_msgs.msg import MarkerArray
 from rail_msgs_py.position import Position
 from rail_msgs_py.table import Table
 
+from .column import Column
 from .qos import ESTIMATE, LATCHED, STREAM
 from .topic import Topic
 
@@ -23,9 +24,27 @@ STATE: Final = Topic(
     "the report",
     "The truth of the tick, one row per train: where its antenna is, how it moves. "
     "Equipment does not read it.",
-    columns=(
-        *("path_m", "x_m", "y_m", "z_m", "heading_rad", "speed_mps", "acceleration_mps2"),
-        *("track_index", "chainage_m", "on_line"),
+    table=(
+        Column(
+            "path_m",
+            "distance of the antenna along the route, 0 at chainage 0 of its first track; the "
+            "antenna is at the end that leads in the first direction of travel",
+        ),
+        Column("x_m", "of the antenna in `map`, east"),
+        Column("y_m", "of the antenna in `map`, north"),
+        Column("z_m", "of the antenna in `map`, altitude"),
+        Column(
+            "heading_rad",
+            "direction of increasing chainage, counter-clockwise from east, not wrapped",
+        ),
+        Column("speed_mps", "positive towards greater chainage"),
+        Column("acceleration_mps2", "derivative of that speed"),
+        Column("track_index", "place of the track in the order of the scenario, from 0"),
+        Column("chainage_m", "of the antenna on that track"),
+        Column(
+            "on_line",
+            "1 if the train is on the line; 0 before it enters and after it has left",
+        ),
     ),
 )
 TRUTH: Final = Topic(
@@ -84,7 +103,14 @@ ODOMETER: Final = Topic(
     "world",
     "",
     "What the wheels of a train count: distance and speed, with the error of their diameter.",
-    columns=("distance_m", "speed_mps"),
+    table=(
+        Column(
+            "distance_m",
+            "run since the start, whichever way; with the error of the wheels' diameter and "
+            "their slip",
+        ),
+        Column("speed_mps", "magnitude, likewise"),
+    ),
 )
 COMMAND: Final = Topic(
     "/{train}/{supervision}/command",
@@ -94,7 +120,12 @@ COMMAND: Final = Topic(
     "code_supervision or atp",
     "world, people, the report",
     "What supervision on board permits and demands; it moves the train in the next tick.",
-    columns=("permitted_mps", "warning", "service_brake", "emergency_brake"),
+    table=(
+        Column("permitted_mps", "speed not to be exceeded, infinite where none is laid down"),
+        Column("warning", "1 if the driver is warned, else 0"),
+        Column("service_brake", "1 if the service brake is demanded, else 0"),
+        Column("emergency_brake", "1 if the emergency brake is demanded, else 0; it goes before"),
+    ),
     awaited=True,
 )
 

@@ -82,7 +82,9 @@ def test_names_of_modules_and_tests_lead_somewhere(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     dotted = {name for name in DOTTED.findall(text) if name not in RECORDS}
     assert [name for name in sorted(dotted) if not leads_somewhere(name)] == []
-    known = [test.relative_to(ROOT).as_posix() for test in (ROOT / "tests").rglob("test_*.py")]
+    places = (ROOT / "tests", ROOT / "examples")
+    found = (test for place in places for test in place.rglob("test_*.py"))
+    known = [test.relative_to(ROOT).as_posix() for test in found]
     tests = sorted(set(TEST_FILE.findall(text)))
     assert [t for t in tests if not any(f"/{k}".endswith(f"/{t}") for k in known)] == []
 

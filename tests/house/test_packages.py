@@ -115,6 +115,7 @@ ROSDEP_KEYS = {
     "orjson": "python3-orjson",
     "pydantic": "python3-pydantic",
     "pydantic_core": "python3-pydantic",
+    "pytest": "python3-pytest",
     "rich": "python3-rich",
     "scipy": "python3-scipy",
     "typer": "python3-typer",

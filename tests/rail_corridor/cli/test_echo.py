@@ -242,5 +242,5 @@ def test_columns_say_what_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_where_nothing_is_said_of_columns_there_is_no_header(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(echo_module, "kind_of", lambda _: replace(ODOMETER))
+    monkeypatch.setattr(echo_module, "kind_of", lambda _: replace(ODOMETER, table=()))
     assert column_lines("/else") == column_lines(ONE) == []

@@ -17,7 +17,7 @@ from rail_corridor.cli.plots import plot_recording
 from rail_corridor.cli.series import Gatherer, Trace, gather_from, panels_of, traces_in, unit_of
 from rail_corridor.cli.usage import UsageError
 from rail_corridor.errors import InputError
-from rail_corridor.recording.mcap_file import RecordingFile
+from rail_corridor.recording.parts import Recording
 from rail_msgs_py.table import Table
 from rail_msgs_py.topics.world import STATE
 
@@ -33,7 +33,7 @@ def recording(made_up: Callable[..., Any]) -> Path:
 
 def gathered(path: Path, *texts: str) -> Gatherer:
     gatherer = Gatherer(trace for text in texts for trace in traces_in(text))
-    with RecordingFile(path) as file:
+    with Recording(path) as file:
         gather_from(file, gatherer)
     return gatherer
 

@@ -135,6 +135,15 @@ def run(
             metavar="NODE",
         ),
     ] = None,
+    attach: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--attach",
+            help="Wait in every tick for this node of yours, beside the others, to be done; "
+            "repeatable.",
+            metavar="NODE",
+        ),
+    ] = None,
     timeout: Annotated[
         float,
         typer.Option(
@@ -200,6 +209,7 @@ def run(
         recorded,
         rate > 0.0 if switches is None else switches,
         allow_failures,
+        tuple(attach or ()),
     )
     raise typer.Exit(run_corridor(loaded, options, Console()))
 

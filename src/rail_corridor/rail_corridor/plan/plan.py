@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +38,7 @@ REPORT: Final = "/report"
 MOST_PROCESSES = 26
 
 
+_FULL_NAME: Final = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _SIDES: Final[dict[Part | None, tuple[Side, ...]]] = {
     None: ("world", "wayside", "onboard"),
     "wayside": ("world", "wayside"),
@@ -86,8 +88,9 @@ class Plan:
         return _packed(groups)
 
 
-def check_external(plan: Plan, external: Iterable[str]) -> None:
-    """Raise InputError for a node that cannot be somebody else's."""
+def check_external(plan: Plan, external: Iterable[str], attached: Iterable[str] = ()) -> None:
+    """Raise InputError for a node that cannot be somebody else's, or stand beside the others."""
+    _check_attached(plan, attached)
     known = [spec.name for spec in plan.nodes if spec.name != WORLD]
     for name in external:
         if name in known:
@@ -96,6 +99,18 @@ def check_external(plan: Plan, external: Iterable[str]) -> None:
         reason = "the corridor has no such node that could be replaced"
         reason += f", did you mean {close[0]}" if close else ""
         raise InputError(reason, field="--external", value=name)
+
+
+def _check_attached(plan: Plan, attached: Iterable[str]) -> None:
+    """Raise InputError for a name that no further node of the corridor can have."""
+    for name in attached:
+        if not _FULL_NAME.fullmatch(name):
+            reason = "must be the full name of a node, as /my/monitor"
+        elif name == REPORT or any(spec.name == name for spec in plan.nodes):
+            reason = "is a node of the corridor itself; --external replaces one"
+        else:
+            continue
+        raise InputError(reason, field="--attach", value=name)
 
 
 def _packed(groups: dict[str, list[NodeSpec]]) -> dict[str, list[NodeSpec]]:

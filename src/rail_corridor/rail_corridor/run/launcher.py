@@ -55,7 +55,7 @@ DRAIN_S = 20.0
 SETTLE_S = 0.3
 #: Wall time for the nodes of this process to leave, after a signal.
 LEAVE_S = 0.5
-#: Exit codes: the other half of a corridor has ended first; nodes have failed.
+#: Exit codes: the other half has ended first; nodes have failed.
 HALF_GONE, NODES_FAILED = 3, 4
 
 
@@ -83,9 +83,10 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
             rate=options.rate,
             timeout_s=options.timeout_s,
             external=options.external,
+            attached=options.attached,
             observers=(REPORT, *external_nodes),
         )
-        check_external(plan, options.external)
+        check_external(plan, options.external, options.attached)
         check_recorded_topics(options, plan)
         compile_before_the_first_run(console)
         with sole_corridor(options.only):
@@ -144,7 +145,7 @@ class _LaunchedRun:
             f"[bold]{self._plan.scenario}[/bold]: {here}, "
             f"{self._plan.ticks * self._plan.tick_s:.0f} s to simulate"
         )
-        for name in self._options.external:
+        for name in (*self._options.external, *self._options.attached):
             self._console.print(f"waiting for {name}, which somebody else runs")
         if self._options.only:
             rest = ELSEWHERE[self._options.only]
@@ -216,7 +217,7 @@ class _LaunchedRun:
             self._on_progress,
             context=context,
             record=self._options.only != "onboard",
-            alone=bool(self._here) and not (self._options.only or self._options.external),
+            alone=bool(self._here) and not self._options.with_external_nodes,
         )
         here = make_nodes(
             self._here,
@@ -227,6 +228,7 @@ class _LaunchedRun:
         nodes = [self._observer, *here]
         if tap is not None and self._options.with_external_nodes:
             others = [spec.name for spec in self._plan.nodes if spec.name not in self._ours]
+            others += self._options.attached
             from .run_recording import SHARED
 
             recorder = ExternalTrafficRecorder(others, tap.select, SHARED, context=context)

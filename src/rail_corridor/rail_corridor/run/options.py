@@ -50,6 +50,8 @@ class RunOptions:
     record: RecordOptions | None = None
     switches: bool = False
     allow_failures: bool = False
+    #: Full names of nodes beside the corridor's that each tick waits for.
+    attached: tuple[str, ...] = ()
     #: Of a run in one process: is given its nodes and their context before they are spun. The
     #: report is then not printed.
     probe: Callable[[list[Any], Any], None] | None = None
@@ -57,7 +59,7 @@ class RunOptions:
     @property
     def with_external_nodes(self) -> bool:
         """Whether somebody else runs some of the nodes."""
-        return bool(self.external or self.only)
+        return bool(self.external or self.attached or self.only)
 
 
 def check_recording(path: Path, only: str | None) -> None:

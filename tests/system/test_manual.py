@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -11,6 +12,8 @@ import pytest
 
 if TYPE_CHECKING:
     from rail_testing.plugin import CorridorFactory
+
+    from .conftest import Rail
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -37,6 +40,32 @@ def test_the_loop_of_the_manual(capsys: pytest.CaptureFixture[str]) -> None:
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert [float(time_s) for time_s, _ in lines] == [0.25 * tick for tick in range(20)]
     assert all(abs(float(error_m)) < 2.0 for _, error_m in lines[4:])
+
+
+@pytest.mark.system
+def test_a_monitor_that_is_attached_hears_every_tick_at_full_speed(rail: Rail) -> None:
+    code = printed("node_contract.md", holds="rclpy.init()")
+    for old, new in (
+        ("/wayside/zone_controller/done", "/my/monitor/done"),
+        ('data="/wayside/zone_controller"', 'data="/my/monitor"'),
+        ("/wayside/zone_controller/train_a/position", "/my/monitor/heard"),
+        ("    position.publish(answer)\n", "    print(message.clock.sec, flush=True)\n"),
+        ("position.get_subscription_count() and ", ""),
+    ):
+        assert old in code
+        code = code.replace(old, new)
+    monitor = rail.start("-c", code, command=[sys.executable])
+    path = rail.directory / "report.json"
+    run = rail.start(
+        *("run", "plain_line", "--duration", 20, "--processes", "one", "--report", path),
+        *("--attach", "/my/monitor"),
+    )
+    assert rail.finish(run) == 0, rail.errors(run)
+    report = json.loads(path.read_text())
+    assert report["failures"] == [] and report["ticks"] == 200
+    monitor.terminate()
+    monitor.wait()
+    assert len(rail.output(monitor).split()) == 200
 
 
 @pytest.mark.system

@@ -23,6 +23,8 @@ from rail_corridor.cli.usage import UsageError
 from rail_msgs_py.ranging.range_reading import RangeReading
 from rail_msgs_py.table import Table
 from rail_msgs_py.topics.world import ODOMETER, STATE
+from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES
+from rail_msgs_py.train_radio.telegrams import Telegrams
 from rail_msgs_py.waveform import Waveform, silence
 
 ONE, MANY, RANGE, WAVE = (
@@ -165,6 +167,21 @@ def test_paths_in_messages_without_a_view() -> None:
     fields = ("status[0].name", "status.1.name")
     lines = shown("/diagnostics", [array], fields=fields, format="csv")
     assert lines == ["stamp_s,status[0].name,status.1.name", '0.0,"a, b",c']
+
+
+def test_a_message_without_a_view_is_an_object_as_a_whole() -> None:
+    status = DiagnosticStatus(level=b"\x02", name="a")
+    (line,) = shown("/diagnostics", [DiagnosticArray(status=[status])], format="json")
+    found = json.loads(line)
+    assert found["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    assert found["status"][0]["level"] == 2 and found["status"][0]["name"] == "a"
+
+
+def test_a_list_is_one_cell() -> None:
+    sent = Telegrams(SECOND, ((3, bytes(FRAME_BYTES)),))
+    lines = shown("/train_a/atp/telegrams", [sent.to_msg()], format="csv")
+    (row,) = csv.DictReader(io.StringIO("\n".join(lines)))
+    assert json.loads(row["frames"]) == [[3, "00" * FRAME_BYTES]]
 
 
 def test_raw_fields_are_those_of_the_message() -> None:

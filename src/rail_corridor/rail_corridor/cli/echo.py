@@ -113,6 +113,9 @@ class Echo:
         return head | {"rows": {record.row: self._values(record) for record in records}}
 
     def _values(self, record: Record) -> dict[str, Any]:
+        if record.message is not None and not self._selection.fields:
+            whole: dict[str, Any] = _plain(record.message)
+            return whole
         return {name: _plain(record[name]) for name in self._names(record) if name != STAMP}
 
 
@@ -142,7 +145,9 @@ def _cell(value: Any) -> str:
         return ""
     if isinstance(value, bool):
         return "true" if value else "false"
-    return repr(value) if isinstance(value, float) else str(value)
+    if isinstance(value, int | float | str):
+        return str(value)
+    return json.dumps(_plain(value))
 
 
 def _plain(value: Any) -> Any:
@@ -152,7 +157,7 @@ def _plain(value: Any) -> Any:
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, bytes):
-        return value.hex()
+        return value[0] if len(value) == 1 else value.hex()  # an octet, or many
     if isinstance(value, complex):
         return [_plain(value.real), _plain(value.imag)]
     if hasattr(value, "get_fields_and_field_types"):

@@ -21,7 +21,7 @@ from .usage import UsageError
 
 STAMP, ROW = "stamp_s", "row"
 _INDEX = re.compile(r"\[(\d+)\]")
-_SCALARS = (bool, int, float, str, np.bool_, np.integer, np.floating)
+_SHOWN = (bool, int, float, str, tuple, np.bool_, np.integer, np.floating)
 
 
 class UnknownField(UsageError):
@@ -68,10 +68,15 @@ class Record:
 
     @property
     def default_fields(self) -> tuple[str, ...]:
-        """What is shown where no fields are chosen: whatever is one value."""
+        """What is shown where no fields are chosen: all but arrays and lists."""
         if isinstance(self._content, Table):
             return self._content.columns
-        return tuple(_scalar_fields(self._content))
+        return tuple(_shown_fields(self._content))
+
+    @property
+    def message(self) -> Any:
+        """The message, where it is read as it is; None where a view of it is read."""
+        return self._content if hasattr(self._content, "get_fields_and_field_types") else None
 
 
 def _followed(content: Any, path: str) -> Any:
@@ -110,16 +115,16 @@ def field_names(content: Any) -> tuple[str, ...]:
     return tuple(declared + computed)
 
 
-def _scalar_fields(content: Any, prefix: str = "") -> Iterable[str]:
+def _shown_fields(content: Any, prefix: str = "") -> Iterable[str]:
     for name in field_names(content):
         try:
             value = getattr(content, name)
         except (IndexError, ValueError):  # of a block without samples the first row, for example
             continue
-        if isinstance(value, _SCALARS) and name != "stamp_ns":
+        if isinstance(value, _SHOWN) and name != "stamp_ns":
             yield prefix + name
         elif hasattr(value, "get_fields_and_field_types"):
-            yield from _scalar_fields(value, f"{prefix}{name}.")
+            yield from _shown_fields(value, f"{prefix}{name}.")
 
 
 class Records(NamedTuple):

@@ -64,7 +64,7 @@ class Graph:
 
     def close(self) -> None:
         """Ask nobody any more."""
-        self._roll_call.__exit__()
+        self._roll_call.close()
 
     def is_settled(self) -> bool:
         """Look again: whether all that is there is known."""
@@ -78,14 +78,12 @@ class Graph:
         if known != self._known:
             self._known, self._changed_s = known, now_s
         age_s, quiet_s = now_s - self._begun_s, now_s - self._changed_s
-        if self._corridor_is_here and not self.publishes(
-            CLOCK.name()
-        ):  # its nodes are still being made
-            return age_s > START_S
+        if self._corridor_is_here and not self.publishes(CLOCK.name()):
+            return age_s > START_S  # its nodes are still being made
         if self._elsewhere:
             return quiet_s > SETTLED_S
-        if not answered:
-            return age_s > ANSWER_S
+        if age_s < ANSWER_S or not answered:
+            return age_s >= ANSWER_S
         # Each has at least one node, and tells its endpoints before its nodes.
         complete = everybody and len(nodes) > len(answered)
         return quiet_s > (QUIET_S if complete else SETTLED_S)
@@ -104,12 +102,7 @@ class Graph:
         return bool(self.node.count_publishers(topic))
 
     def wait(self, found: Callable[[], bool] = lambda: False) -> None:
-        """Wait until all is known, or what is looked for is found.
-
-        Raises
-        ------
-        KeyboardInterrupt
-        """
+        """Wait until all is known, or what is looked for is found."""
         while not (found() or self.is_settled()):
             time.sleep(_POLL_S)
 

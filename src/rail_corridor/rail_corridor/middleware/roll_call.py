@@ -54,6 +54,10 @@ class RollCall:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ask nobody any more."""
         self._socket.close()
 
     def ask(self) -> None:

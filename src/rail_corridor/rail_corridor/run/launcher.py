@@ -74,9 +74,7 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
     discover_on("all" if options.only else "this")
     directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
     try:
-        external_nodes = (
-            (EXTERNAL_TRAFFIC,) if options.record and options.with_external_nodes else ()
-        )
+        outside = bool(options.record and options.with_external_nodes)
         plan = make_plan(
             scenario,
             directory,
@@ -84,7 +82,7 @@ def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
             timeout_s=options.timeout_s,
             external=options.external,
             attached=options.attached,
-            observers=(REPORT, *external_nodes),
+            observers=(REPORT, *[EXTERNAL_TRAFFIC] * outside),
         )
         check_external(plan, options.external, options.attached)
         check_recorded_topics(options, plan)

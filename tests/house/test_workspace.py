@@ -38,7 +38,7 @@ def test_colcon_builds_the_workspace(tmp_path: Path) -> None:
         check=False,
     )
     assert build.returncode == 0, build.stdout + build.stderr
-    assert "Summary: 6 packages finished" in build.stdout
+    assert "Summary: 7 packages finished" in build.stdout
     install = tmp_path / "ws" / "install"
     for package, script in (
         ("rail_world", "world"),

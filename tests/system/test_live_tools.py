@@ -22,7 +22,6 @@ pytestmark = pytest.mark.system
 
 ECHOES = {
     "/wayside/wrs1/zone1/tx": r"CH1 .* 1 x 960 samples at 4 MS/s, -10\.0 dBm",
-    "/wayside/zone_controller/train_a/position": r"train_a on main: \d+\.\d+ m ± .* km/h",
     "/diagnostics": r"ok +/",
 }
 
@@ -75,8 +74,8 @@ def test_topics_echo_and_hz_of_a_running_corridor(
     assert second_s - first_s == pytest.approx(0.5)
     assert min(first) > 0.0
     assert rail.finish(wrong) == 2
-    assert rail.output(wrong) == "" and rail.errors(wrong).count("\n") == 1
-    assert "train_a.speed_mps" in rail.errors(wrong)
+    said = [line for line in rail.errors(wrong).splitlines() if not line.startswith("# ")]
+    assert rail.output(wrong) == "" and len(said) == 1 and "train_a.speed_mps" in said[0]
     assert rail.finish(piped) == 0, rail.errors(piped)
     assert (rail.output(piped), rail.errors(piped)) == ("clock:\n", "")
     assert rail.finish(foreign) == 0

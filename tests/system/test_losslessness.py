@@ -16,6 +16,8 @@ from rail_msgs_py.topics.ranging import POSITION
 from rail_msgs_py.topics.tick import CLOCK, DIAGNOSTICS, OBSERVED
 
 if TYPE_CHECKING:
+    from rail_testing.plugin import CorridorFactory
+
     from .conftest import Listener, Rail
 
 pytestmark = pytest.mark.system
@@ -23,7 +25,7 @@ _RUN = ("jammed_channel", "--duration", 30)
 
 
 def test_a_report_that_stands_still_for_a_hundred_ticks_misses_none(
-    rail: Rail, listener: Listener
+    rail: Rail, listener: Listener, corridor: CorridorFactory
 ) -> None:
     path = rail.directory / "report.json"
     clock, observed = listener.listen(CLOCK), listener.listen(OBSERVED)
@@ -39,7 +41,7 @@ def test_a_report_that_stands_still_for_a_hundred_ticks_misses_none(
     report = json.loads(path.read_text())
     assert report["complete"] and report["ticks"] == 300
     assert report["missing_ticks"] == 0 and not report["failures"]
-    whole = rail.report(*_RUN, "--processes", "one")
+    whole = corridor("jammed_channel", duration_s=30.0).run_to_end().report
     assert report["digest"] == whole["digest"]
     # What nodes said of their health as well, each change once.
     assert report["events"] == whole["events"] and len(whole["events"]) >= 4

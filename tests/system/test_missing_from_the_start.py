@@ -18,6 +18,8 @@ from rail_msgs_py.topics.ranging import POSITION
 from rail_msgs_py.topics.tick import CLOCK, FAILED
 
 if TYPE_CHECKING:
+    from rail_testing.plugin import CorridorFactory
+
     from .conftest import Listener, Rail
 
 pytestmark = pytest.mark.system
@@ -26,7 +28,7 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 @pytest.mark.parametrize("placement", ["one", "site"])
-def test_a_station_that_never_comes(rail: Rail, placement: str) -> None:
+def test_a_station_that_never_comes(rail: Rail, corridor: CorridorFactory, placement: str) -> None:
     path = rail.directory / "report.json"
     run = rail.start(
         *("run", "plain_line", "--duration", 15, "--processes", placement, "--timeout", 2),
@@ -40,9 +42,10 @@ def test_a_station_that_never_comes(rail: Rail, placement: str) -> None:
     # At full speed: nobody is waited for any longer.
     assert report["wall_time_s"] < 10.0
     # As if it had been killed in the first tick.
-    killed = rail.report(
-        *("plain_line", "--duration", 15, "--processes", "one", "--kill", f"{NODE}@0.1")
-    )
+    c = corridor("plain_line", duration_s=15.0)
+    c.step()
+    c.kill(NODE)
+    killed = c.run_to_end().report
     assert report["trains"].keys() == killed["trains"].keys()
     assert report["trains"]["train_a"]["phase_ranging"] == pytest.approx(
         killed["trains"]["train_a"]["phase_ranging"], rel=0.1

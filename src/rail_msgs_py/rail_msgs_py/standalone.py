@@ -66,8 +66,9 @@ def signals_to(handle: Callable[[int], None]) -> Iterator[None]:
     # Python writes the number of each signal here as it arrives, whatever the main thread does.
     read_end, write_end = socket.socketpair()
     write_end.setblocking(False)
-    previous = {number: signal.signal(number, lambda *_: None) for number in numbers}
+    # In this order: a signal in between ends the process, and is not lost.
     previous_fd = signal.set_wakeup_fd(write_end.fileno(), warn_on_full_buffer=False)
+    previous = {number: signal.signal(number, lambda *_: None) for number in numbers}
 
     def watch() -> None:
         while received := read_end.recv(1):

@@ -163,6 +163,26 @@ MUTANTS: list[Mutant] = [
             "pass",
         ),
     ),
+    *_group(
+        f"{CORRIDOR}/recording/parts.py",
+        "rail_corridor/recording/test_parts.py",
+        (
+            "what a part repeats is said again",
+            "message.sequence > newest.get(topic, 0)",
+            "True",
+        ),
+        ("a part of another recording is taken", "if not same or", "if"),
+    ),
+    *_group(
+        f"{CORRIDOR}/report/from_recording.py",
+        "rail_corridor/recording/test_parts.py",
+        ("a report of what was not recorded is made", "    if names:", "    if not names:"),
+    ),
+    *_group(
+        "rail_msgs_py/rail_msgs_py/map_pose.py",
+        "rail_msgs_py/test_map_pose.py rail_corridor/report/test_map_poses.py",
+        ("a slope is none of the covariance", "* (1.0 + self.slope**2)", "* 1.0"),
+    ),
     # Counters and thresholds of the report.
     *_group(
         f"{EQUIPMENT}/ranging/report.py",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 from typing import TYPE_CHECKING, Any
 
@@ -10,9 +11,10 @@ import pytest
 from rclpy.qos import QoSProfile
 
 from rail_msgs_py.cdr_stamp import stamp_reader
+from rail_msgs_py.map_pose import MapPose
 from rail_msgs_py.topics.ranging import POSITION, RANGE, WRS_RX, WRS_TX
 from rail_msgs_py.topics.tick import CLOCK, DIAGNOSTICS
-from rail_msgs_py.topics.world import STATE
+from rail_msgs_py.topics.world import MAP_POSE, STATE
 
 if TYPE_CHECKING:
     from rail_msgs_py.topics.topic import Topic
@@ -96,3 +98,29 @@ def test_who_joins_a_process_hears_the_tick_at_hand_and_the_health_of_all(
     assert joined_s - 0.1 < said_s[0] < joined_s + 3.0
     run.send_signal(signal.SIGINT)
     assert rail.finish(run) == 128 + signal.SIGINT
+
+
+def test_poses_in_the_map_are_there_for_who_asks(rail: Rail, listener: Listener) -> None:
+    poses: dict[str, list[Any]] = {
+        source: listener.listen(MAP_POSE, train="train_a", source=source)
+        for source in ("truth", "ranging")
+    }
+    run = rail.start(*_RUN, "--rate", 8)
+    listener.until(lambda: all(len(heard) > 8 for heard in poses.values()))
+    run.send_signal(signal.SIGINT)
+    assert rail.finish(run) == 128 + signal.SIGINT
+    by_time = {
+        source: {pose.stamp_ns: pose for pose in map(MapPose.from_msg, heard)}
+        for source, heard in poses.items()
+    }
+    truth, ranging = by_time["truth"], by_time["ranging"]
+    assert {stamp_ns % 10**9 for stamp_ns in truth} == {900_000_000}
+    assert all(pose.variance_m2 is None for pose in truth.values())
+    both = truth.keys() & ranging.keys()
+    assert len(both) > 5
+    for stamp_ns in both:
+        here, thought = truth[stamp_ns], ranging[stamp_ns]
+        assert thought.variance_m2 is not None
+        away_m = math.dist((here.x_m, here.y_m, here.z_m), (thought.x_m, thought.y_m, thought.z_m))
+        assert away_m < 6.0 * math.sqrt(thought.variance_m2) + 1.0
+        assert thought.heading_rad == pytest.approx(here.heading_rad, abs=0.02)

@@ -132,7 +132,7 @@ def test_a_full_disk_is_told_and_the_run_goes_on(rail: Rail) -> None:
 def test_a_selection_in_parts_gives_the_report_of_the_run(rail: Rail) -> None:
     path = rail.directory / "run.mcap"
     report = rail.report(
-        *("moving_block", "--duration", 60, "--processes", "one", "--record", path),
+        *("moving_block", "--duration", 90, "--processes", "one", "--record", path),
         *("--no-waveforms", "--record-split", 1),
     )
     assert len(parts_of(path)) > 1

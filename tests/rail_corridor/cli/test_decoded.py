@@ -10,6 +10,7 @@ from std_msgs.msg import Float64MultiArray, String
 
 from rail_corridor.cli.decoded import decode
 from rail_corridor.equipment.registry import topics
+from rail_msgs_py.map_pose import MapPose
 from rail_msgs_py.position import Position
 from rail_msgs_py.ranging.range_reading import RangeReading
 from rail_msgs_py.table import Table
@@ -19,6 +20,10 @@ from rail_msgs_py.waveform import Waveform
 
 STAMP_NS = 2_500_000_000
 SHOWN: dict[type, tuple[Any, str]] = {
+    MapPose: (
+        MapPose(STAMP_NS, 10.0, -2.5, 3.0, 0.5, 0.01, 0.04),
+        "x 10.00 m, y -2.50 m, z 3.00 m ± 0.200 m along, heading 28.6°, +10.0 ‰",
+    ),
     Position: (
         Position(STAMP_NS, "train_a", "main", 120.5, 0.04, 20.0, 0.1),
         "train_a on main: 120.500 m ± 0.200 m, 72.0 km/h",
@@ -37,8 +42,8 @@ SHOWN: dict[type, tuple[Any, str]] = {
 def test_every_view_of_a_topic_is_put_into_words(view: type) -> None:
     shown, words = SHOWN[view]
     topic = next(topic for topic in topics() if topic.view is view)
-    parts = {name: "x" for name in ("train", "site", "zone", "base", "supervision", "channel")}
-    text = decode(topic.name(**parts), shown.to_msg())
+    parts = ("train", "site", "zone", "base", "supervision", "channel", "source")
+    text = decode(topic.name(**dict.fromkeys(parts, "x")), shown.to_msg())
     assert text.startswith("     2.500 s  ")
     assert words in text
 

@@ -48,6 +48,7 @@ PARTS = {
     "station": ("ref1", "wrs1", "r"),
     "supervision": ("atp", "code_supervision"),
     "end": ("head", "tail"),
+    "source": ("truth", "ranging"),
     "node": ("/world/radio_medium", "/wayside/zone_controller"),
 }
 MODULES = [

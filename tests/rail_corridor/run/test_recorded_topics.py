@@ -30,7 +30,8 @@ def check(scenario: str, *patterns: str, waveforms: bool = True) -> None:
 @pytest.mark.parametrize(
     ("scenario", "pattern"),
     [
-        *(("demo", p) for p in ("*", "/clock", "/ready", "*/done", "/report/*", "/world/main/*")),
+        *(("demo", p) for p in ("*", "/clock", "/ready", "*/done", "/report/t*", "/world/main/*")),
+        ("demo", "/report/train_a/truth/pose"),
         *(("demo", p) for p in ("/train_a/*", "/train_?/vrs/channel_[12]/rx", "*/zone1/tx")),
         ("demo", "/world/radio_medium/done"),
         ("moving_block", "/wayside/base1/cbtc/*link"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from visualization_msgs.msg import Marker
 
@@ -49,6 +49,13 @@ class MapScene:
         assert state is not None
         return state
 
+    def row(self, topic: Topic, train: int) -> dict[str, float] | None:
+        """What a table says of a train, by the names of its columns; None if it says nothing."""
+        table = self.table(topic)
+        if table is None:
+            return None
+        return dict(zip(topic.columns, table[train].tolist(), strict=True))
+
     def on_line(self, train: int) -> bool:
         """Whether a train is on the line."""
         return bool(self.state[train, STATE.index["on_line"]] > 0.0)
@@ -62,6 +69,14 @@ class MapScene:
             setattr(marker.header.stamp, key, part)
         marker.color.r, marker.color.g, marker.color.b, marker.color.a = colour
         return marker
+
+
+class TrackEstimate(NamedTuple):
+    """Where equipment thinks a train to be: track, chainage [m] and its variance [m^2]."""
+
+    track: str
+    chainage_m: float
+    variance_m2: float
 
 
 @dataclass(frozen=True)

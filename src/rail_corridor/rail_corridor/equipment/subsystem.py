@@ -17,7 +17,7 @@ from rail_world.line.description_base import Description
 from rail_world.line.drawing import Drawing
 
 from .live import LiveView
-from .map_scene import MapMarkers, MapScene
+from .map_scene import MapMarkers, MapScene, TrackEstimate
 from .node_spec import NodeKind, NodeSpec
 from .run_figures import RunFigures
 
@@ -111,6 +111,8 @@ class Subsystem:
     topics: ClassVar[tuple[Topic, ...]] = ()
     #: Figures of its report that are zero, or none, in a safe run: ``trains.*.atp.overspeed_s``.
     hazards: ClassVar[tuple[str, ...]] = ()
+    #: The topic of those that the report reads from which `map_estimate` is taken.
+    locates_by: ClassVar[Topic | None] = None
     #: Folder of scenarios that come with it, which then run by their names; None if none do.
     scenarios: ClassVar[Path | None] = None
 
@@ -183,6 +185,10 @@ class Subsystem:
     def map_markers(self, scene: MapScene) -> MapMarkers:
         """What it adds to the trains in RViz and Foxglove."""
         return MapMarkers()
+
+    def map_estimate(self, scene: MapScene, train: int) -> TrackEstimate | None:
+        """Where it thinks a train to be, None if it does not know; see `locates_by`."""
+        return None
 
     def run_figures(self) -> RunFigures:
         """What it adds to the figures of a run; made only by those who draw them."""

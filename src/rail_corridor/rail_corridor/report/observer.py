@@ -19,11 +19,12 @@ from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.topics.qos import OBSERVER_WINDOW_TICKS
 from rail_msgs_py.topics.tick import DIAGNOSTICS, FAILED, OBSERVED
 from rail_msgs_py.topics.topic import Topic
-from rail_msgs_py.topics.world import STATE, TRAIN_MARKERS
+from rail_msgs_py.topics.world import MAP_POSE, STATE, TRAIN_MARKERS
 from rail_signals.arrays import FloatArray
 
 from .intake import Intake
 from .map_markers import train_markers
+from .map_poses import TRUTH, locators_of, map_poses
 
 NAME = REPORT.strip("/")
 
@@ -59,6 +60,13 @@ class Observer(CorridorNode):
             self._network = plan.world.network()
             self._first_tracks = tuple(train.route[0] for train in plan.world.trains)
             self._markers = self.publisher(TRAIN_MARKERS)
+            self._locators = locators_of(plan.records)
+            sources = (TRUTH, *(each.name for each in self._locators))
+            self._poses = {
+                (train, source): self.publisher(MAP_POSE, train=train, source=source)
+                for train in self.recording.trains
+                for source in sources
+            }
             self._observed = self.publisher(OBSERVED)
         for reader in self.intake.readers:
             if not reader.raw:
@@ -119,8 +127,8 @@ class Observer(CorridorNode):
             tick = self.tick - 1
             self.at_tick(max(tick, 0) * self._tick_ns)
             of_a_second = tick * self._tick_ns % NANOSECONDS < self._tick_ns
-            if of_a_second and self._markers.get_subscription_count():
-                self._publish_markers(tick - 1)
+            if of_a_second and tick:
+                self._publish_map(tick - 1)
             if tick % window == 0:
                 header = Header()
                 header.stamp.sec, header.stamp.nanosec = divmod(tick * self._tick_ns, 1_000_000_000)
@@ -128,10 +136,26 @@ class Observer(CorridorNode):
 
         return take_state
 
-    def _publish_markers(self, tick: int) -> None:
+    def _publish_map(self, tick: int) -> None:
         """Trains of a tick in the map; everything about the one before the present is in."""
-        if tick < 0:
+        markers_wanted = bool(self._markers.get_subscription_count())
+        poses_wanted = {
+            key: publisher
+            for key, publisher in self._poses.items()
+            if publisher.get_subscription_count()
+        }
+        if not (markers_wanted or poses_wanted):
             return
+        scene = self._scene(tick)
+        if markers_wanted:
+            self._markers.publish(train_markers(scene))
+        for train in {train for train, _ in poses_wanted}:
+            poses = map_poses(scene, scene.trains.index(train), self._locators)
+            for source, pose in poses.items():
+                if (train, source) in poses_wanted:
+                    poses_wanted[train, source].publish(pose.to_msg())
+
+    def _scene(self, tick: int) -> MapScene:
         recording = self.intake.recording
 
         def table(topic: Topic) -> FloatArray | None:
@@ -139,7 +163,6 @@ class Observer(CorridorNode):
                 return None
             return np.asarray(recording[topic].upto(tick + 1)[tick])
 
-        scene = MapScene(
+        return MapScene(
             tick * self._tick_ns, recording.trains, self._network, self._first_tracks, table
         )
-        self._markers.publish(train_markers(scene))

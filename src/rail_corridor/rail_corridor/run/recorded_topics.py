@@ -10,6 +10,7 @@ from rail_corridor.equipment.registry import node_kinds, topics
 from rail_corridor.errors import InputError
 from rail_corridor.plan.plan import Plan
 from rail_corridor.recording.topic_selection import TopicSelection, fits_some_name
+from rail_corridor.report.map_poses import TRUTH, locators_of
 from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.waveform import Waveform
 
@@ -47,15 +48,17 @@ def _is_sent(topic: Topic, plan: Plan) -> bool:
 
 
 def names_in(plan: Plan) -> frozenset[str]:
-    """What may stand in the name of a topic: of nodes, tracks and trains, and of what nodes know.
+    """What may stand in the name of a topic: of nodes, tracks, trains, and of what nodes know.
 
-    Zones and channels are known to the nodes that work on them, as parameters.
+    Zones and channels are known to the nodes that work on them, as parameters; equipment is a
+    source of poses by its own name.
     """
     names = {spec.name for spec in plan.nodes}
     words = {word for name in names for word in name.strip("/").split("/")}
     known = {word for spec in plan.nodes for word in _words(spec.parameters.values())}
     trains = (train.name for train in plan.world.trains)
-    return frozenset((*names, *words, *known, *trains, *plan.world.tracks))
+    sources = (TRUTH, *(each.name for each in locators_of(plan.records)))
+    return frozenset((*names, *words, *known, *trains, *plan.world.tracks, *sources))
 
 
 def _words(values: Any) -> Iterator[str]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from std_msgs.msg import Float64MultiArray, String
 from visualization_msgs.msg import MarkerArray
 
+from rail_msgs_py.map_pose import MapPose
 from rail_msgs_py.position import Position
 from rail_msgs_py.table import Table
 
@@ -85,6 +87,20 @@ TRAIN_MARKERS: Final = Topic(
     "the position by phase ranging as an ellipsoid of two sigma, the interval of the localizer as "
     "a line.",
 )
+MAP_POSE: Final = Topic(
+    "/report/{train}/{source}/pose",
+    PoseWithCovarianceStamped,
+    ESTIMATE,
+    MapPose,
+    "the report",
+    "RViz, Foxglove, filters",
+    "Pose of a train in `map`, aligned with the track, once a second of simulated time, while "
+    "somebody listens and where a position is known: the source is truth (exact) or what has "
+    "estimated it, ranging, doppler or localizer. Along the track the covariance is that of the "
+    "estimate; across it and up the standard deviation is 0.1 m, about its x 0.1 rad, about y and "
+    "z 0.01 rad.",
+    below_owner=3,
+)
 SCENARIO: Final = Topic(
     "/world/scenario",
     String,
@@ -136,6 +152,7 @@ TOPICS: Final[tuple[Topic, ...]] = (
     CORRIDOR_PATH,
     CORRIDOR_MARKERS,
     TRAIN_MARKERS,
+    MAP_POSE,
     SCENARIO,
     ODOMETER,
     COMMAND,

@@ -8,6 +8,7 @@ from typing import Any, Final
 from rich.console import RenderableType
 
 from rail_corridor.equipment.live import LiveView
+from rail_corridor.equipment.map_scene import MapScene, TrackEstimate
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.position_errors import position_table
 from rail_corridor.equipment.run_figures import RunFigures
@@ -54,6 +55,7 @@ class DopplerSubsystem(Subsystem):
         ),
     )
     topics = topics.TOPICS
+    locates_by = DOPPLER_FIX
 
     def check(self, scenario: Scenario, train_fields: Sequence[str]) -> None:
         """See `Subsystem.check`."""
@@ -112,6 +114,13 @@ class DopplerSubsystem(Subsystem):
         from .cards import DopplerView  # wanted by the live page only
 
         return DopplerView()
+
+    def map_estimate(self, scene: MapScene, train: int) -> TrackEstimate | None:
+        """See `Subsystem.map_estimate`."""
+        row = scene.row(DOPPLER_FIX, train)
+        if row is None or row["reason"] != 0.0:
+            return None
+        return TrackEstimate(scene.first_tracks[train], row["chainage_m"], row["chainage_m2"])
 
     def run_figures(self) -> RunFigures:
         """See `Subsystem.run_figures`."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
 from typing import Any, Final
 
 from rich.console import RenderableType
 
 from rail_corridor.equipment.live import LiveView
-from rail_corridor.equipment.map_scene import MapMarkers, MapScene
+from rail_corridor.equipment.map_scene import MapMarkers, MapScene, TrackEstimate
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.one_way import check_one_way
 from rail_corridor.equipment.position_errors import position_table
@@ -43,6 +44,7 @@ class LocalizerSubsystem(Subsystem):
         ),
     )
     topics = topics.TOPICS
+    locates_by = LOCALIZER_STATE
 
     def check(self, scenario: Scenario, train_fields: Sequence[str]) -> None:
         """See `Subsystem.check`."""
@@ -97,6 +99,13 @@ class LocalizerSubsystem(Subsystem):
         from .map_markers import interval_markers  # wanted by the report only
 
         return interval_markers(scene)
+
+    def map_estimate(self, scene: MapScene, train: int) -> TrackEstimate | None:
+        """See `Subsystem.map_estimate`."""
+        row = scene.row(LOCALIZER_STATE, train)
+        if row is None or not isfinite(row["front_m"]):
+            return None
+        return TrackEstimate(scene.first_tracks[train], row["front_m"], row["sigma_m"] ** 2)
 
 
 LOCALIZER: Final = LocalizerSubsystem()

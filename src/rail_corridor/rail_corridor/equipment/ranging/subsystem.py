@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import RenderableType
 
 from rail_corridor.equipment.live import LiveView
-from rail_corridor.equipment.map_scene import MapMarkers, MapScene
+from rail_corridor.equipment.map_scene import MapMarkers, MapScene, TrackEstimate
 from rail_corridor.equipment.node_spec import NodeKind, NodeSpec
 from rail_corridor.equipment.run_figures import RunFigures
 from rail_corridor.equipment.subsystem import PlanContext, SectionOption, Subsystem
@@ -63,6 +63,7 @@ class RangingSubsystem(Subsystem):
         NodeKind("vrs", "rail_onboard.ranging.vrs_node:VrsNode"),
     )
     topics = topics.TOPICS
+    locates_by = POSITION
 
     def check(self, scenario: Scenario, train_fields: Sequence[str]) -> None:
         """See `Subsystem.check`."""
@@ -159,6 +160,12 @@ class RangingSubsystem(Subsystem):
         from .map_markers import position_markers  # wanted by the report only
 
         return position_markers(scene)
+
+    def map_estimate(self, scene: MapScene, train: int) -> TrackEstimate | None:
+        """See `Subsystem.map_estimate`."""
+        from .map_markers import position_estimate  # wanted by the report only
+
+        return position_estimate(scene, train)
 
 
 RANGING: Final = RangingSubsystem()

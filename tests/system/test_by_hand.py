@@ -45,7 +45,7 @@ def test_a_world_that_refuses_its_parameters_ends_all_of_it(
     rail: Rail, tmp_path: Path, wait_until: Callable[[Callable[[], Any]], Any]
 ) -> None:
     written = tmp_path / "written"
-    command = ("plan", "plain_line", "--zone-length", 600, "--write", written)
+    command = ("plan", "plain_line", "--zone-length", 390, "--write", written)
     assert rail.finish(rail.start(*command)) == 0
     again = rail.start(*command)
     assert rail.finish(again) == 2 and "not empty" in rail.errors(again)

@@ -65,10 +65,9 @@ def module_domain() -> Iterator[int]:
 
 
 _SECOND_GROUP = {
-    "test_positions_on_board",
-    *("test_kill_campaign", "test_track_codes", "test_train_radio", "test_placement"),
-    *("test_hostile_network", "test_train_bus", "test_axle_counter"),
-    *("test_failures", "test_examples", "test_losslessness", "test_listeners", "test_recordings"),
+    *("test_corridor", "test_plugin", "test_positions_on_board", "test_train_radio"),
+    *("test_placement", "test_axle_counter", "test_two_hosts", "test_failures", "test_examples"),
+    *("test_losslessness", "test_listeners", "test_recordings"),
 }
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from rail_corridor.errors import InputError
-from rail_corridor.middleware.domain import is_held, sole_corridor
+from rail_corridor.middleware.domain import free_domain, is_held, sole_corridor
 
 
 @pytest.fixture(autouse=True)
@@ -46,3 +47,16 @@ def test_whether_a_domain_is_held(tmp_path: Path, part: str | None) -> None:
         with sole_corridor("onboard" if part == "wayside" else "report", tmp_path):
             pass
     assert not is_held(tmp_path)
+
+
+def test_free_domains_are_different_ones_until_none_is_left(tmp_path: Path) -> None:
+    with ExitStack() as held:
+        domains = {held.enter_context(free_domain(None, tmp_path)) for _ in range(30)}
+        assert len(domains) == 30 and min(domains) > 0
+        with pytest.raises(InputError, match="domain: 'any': a corridor is running"):
+            held.enter_context(free_domain(None, tmp_path))
+        (one,) = list(domains)[:1]
+        with pytest.raises(InputError, match=f"domain: {one}: a corridor is running"):
+            held.enter_context(free_domain(one, tmp_path))
+    with free_domain(one, tmp_path) as again:
+        assert again == one

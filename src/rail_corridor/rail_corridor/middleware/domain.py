@@ -21,8 +21,8 @@ class _TakenError(InputError):
     """The domain is taken."""
 
 
-#: Domains that are chosen from, where any will do: their ports are below those of the system's own.
-_FREE = range(101, 10, -1)
+#: Domains that are chosen from, where any will do.
+_FREE = range(10, 40)
 
 
 @contextmanager
@@ -38,7 +38,8 @@ def free_domain(domain: int | None = None, directory: Path | None = None) -> Ite
         If the given one, or every one, is taken.
     """
     start = os.getpid() + next(_TURN) * 7
-    candidates = [domain] if domain is not None else [_FREE[(start + n) % 91] for n in range(91)]
+    turns = range(start, start + len(_FREE))
+    candidates = [domain] if domain is not None else [_FREE[n % len(_FREE)] for n in turns]
     for candidate in candidates:
         try:
             with sole_corridor(None, directory, domain=str(candidate)):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import os
 import re
 import signal
@@ -17,6 +16,8 @@ import pytest
 from rail_msgs_py.topics.tick import DIAGNOSTICS
 
 if TYPE_CHECKING:
+    from rail_testing.plugin import CorridorFactory
+
     from .conftest import Listener, Rail
 
 pytestmark = pytest.mark.system
@@ -58,16 +59,10 @@ def test_echo_positions(rail: Rail) -> None:
     assert rail.finish(corridor) == 128 + signal.SIGINT
 
 
-def test_own_estimator(rail: Rail) -> None:
-    path = rail.directory / "report.json"
-    controller = ("--external", "/wayside/zone_controller")
-    corridor = rail.start("run", "plain_line", "--duration", 15, *controller, "--report", path)
-    mine = rail.start(command=example("own_estimator.py"))
-    assert rail.finish(corridor) == 0, rail.errors(corridor)
-    mine.send_signal(signal.SIGTERM)
-    rail.finish(mine)
-    assert not rail.errors(mine)
-    report = json.loads(path.read_text())
+def test_own_estimator(corridor: CorridorFactory) -> None:
+    c = corridor("plain_line", duration_s=15.0)
+    c.add(command=example("own_estimator.py"), replaces="/wayside/zone_controller")
+    report = c.run_to_end().report
     assert report["failures"] == []
     ranging = report["trains"]["train_a"]["phase_ranging"]
     assert ranging["misleading_ticks"] == 0

@@ -41,6 +41,7 @@ def load_for_nodes(kinds: Iterable[str]) -> None:
     # The collector does not look through it again, nor make each process its own copy of it.
     gc.collect()
     gc.freeze()
+    gc.enable()  # `rail` loads without it
 
 
 def make_node(spec: NodeSpec, context: Any, services: Any) -> Any:

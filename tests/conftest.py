@@ -79,3 +79,8 @@ def pytest_itemcollected(item: pytest.Item) -> None:
     if item.get_closest_marker("system"):
         second = item.path.stem in _SECOND_GROUP
         item.add_marker(pytest.mark.xdist_group("system_runs" if second else "system"))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the two long groups; the short tests fill what time they leave."""
+    items.sort(key=lambda item: item.get_closest_marker("system") is None)

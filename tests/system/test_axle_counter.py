@@ -81,7 +81,8 @@ def test_a_miscount_and_a_dead_point_are_in_the_report(with_it: Rail, installed:
     fault = "faults:\n  - {kind: missed_axles, point: dp1, every: 3}\n"
     path = with_it.directory / "loose_head.yaml"
     path.write_text(shipped(installed) + fault)
-    report = with_it.report(path, "--kill", "/wayside/dp3/wheel_sensor@20", "--timeout", 5)
+    kill = ("--kill", "/wayside/dp3/wheel_sensor@20", "--timeout", 5)
+    report = with_it.report(path, "--processes", "one", *kill)
     points, sections = (report["axle_counter"][name] for name in ("points", "sections"))
     assert points["dp1"]["miscounts"] == 8
     assert points["dp2"]["miscounts"] == 0

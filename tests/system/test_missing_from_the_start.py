@@ -76,7 +76,7 @@ def test_who_comes_late_is_taken_up_again(rail: Rail, listener: Listener) -> Non
     clock, failed = listener.listen(CLOCK), listener.listen(FAILED)
     positions = listener.listen(POSITION, train="train_a")
     run = rail.start(
-        *("run", "plain_line", "--rate", 5, "--processes", "site", "--timeout", 1),
+        *("run", "plain_line", "--rate", 5, "--processes", "site", "--timeout", 3),
         *("--external", controller, "--allow-failures", "--report", path),
     )
     listener.until(lambda: len(clock) > 5)

@@ -3,9 +3,32 @@
 With pytest, the fixture ``corridor`` makes them and closes them by itself.
 """
 
-from .corridor import Corridor
-from .interception import Late
-from .outcome import Outcome
-from .repeatability import Difference, first_difference
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .corridor import Corridor
+    from .interception import Late
+    from .outcome import Outcome
+    from .repeatability import Difference, first_difference
+
+_FOUND_IN = {
+    "Corridor": "corridor",
+    "Late": "interception",
+    "Outcome": "outcome",
+    "Difference": "repeatability",
+    "first_difference": "repeatability",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load what is asked for: every run of pytest imports this package for its plug-in."""
+    if name not in _FOUND_IN:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(f"{__name__}.{_FOUND_IN[name]}"), name)
+
 
 __all__ = ["Corridor", "Difference", "Late", "Outcome", "first_difference"]

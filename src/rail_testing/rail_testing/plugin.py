@@ -15,12 +15,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
-from .corridor import Corridor
-from .repeatability import first_difference
+if TYPE_CHECKING:  # the rest of the corridor is loaded by the first test that needs it
+    from .corridor import Corridor
 
 _MARKER = "rail(seeds=None, placements=None, repeat=False): seeds and placements to run a test with"
 
@@ -48,6 +48,8 @@ class CorridorFactory:
 
     def __call__(self, scenario: Any, **arguments: Any) -> Corridor:
         """A corridor; arguments as of `Corridor`. What the marker says goes before."""
+        from .corridor import Corridor
+
         if self._variant.seed is not None:
             arguments["seed"] = self._variant.seed
         if self._variant.placement is not None:
@@ -103,6 +105,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]
     factory = _factory_of(pyfuncitem)
     if marker is None or not marker.kwargs.get("repeat") or factory is None:
         return answer
+    from .repeatability import first_difference
+
     before = [each.histories for each in factory.made]
     factory.close()
     factory.made.clear()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, String
 
+from rail_corridor.equipment.registry import subsystems
 from rail_corridor.errors import InputError
 from rail_msgs_py.position import Position
 from rail_msgs_py.stamps import to_ns
@@ -356,3 +358,16 @@ def test_a_command_that_ends_fails_the_test(corridor: Make) -> None:
     c.add(command=command, replaces="/wayside/zone_controller")
     with pytest.raises(NodeError, match="ended with 7"):
         c.run_to_end()
+
+
+def test_every_hazard_is_a_figure_of_a_report(corridor: Make) -> None:
+    found = set()
+    for scenario in ("located_block", "located_codes", "failing_bus"):
+        c = corridor(scenario)
+        c.step(3)
+        trains = "|".join(train.name for train in c.scenario.trains)
+        found |= {
+            re.sub(rf"^trains\.({trains})\.", "trains.*.", path) for path in c.verdict().counters
+        }
+        c.close()
+    assert found == {path for each in subsystems() for path in each.hazards}

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from rail_corridor import simulate
+
 if TYPE_CHECKING:
     from rail_testing.plugin import CorridorFactory
 
@@ -38,6 +40,7 @@ def test_every_placement_and_rate_gives_the_same_digest(
         ("node", 0): rail.report(*run, "node"),
         ("one", 8): rail.report(*run, "one", "--rate", 8),
     }
+    runs["loop", 0] = simulate("branch", duration_s=_SECONDS).run().report
     assert all(_whole(report) for report in runs.values())
     assert len({report["digest"] for report in runs.values()}) == 1
     # As many processes as were asked for, and pacing that keeps to its rate.

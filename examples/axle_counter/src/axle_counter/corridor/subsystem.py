@@ -48,6 +48,7 @@ class AxleCounter(Subsystem):
             waits=True,
         ),
     )
+    hazards = ("axle_counter.free_while_occupied_ticks",)
     topics = topics.TOPICS
     scenarios = Path(__file__).parents[1] / "scenarios"
 

@@ -301,7 +301,6 @@ def test_a_process_is_killed_and_comes_back(corridor: Make) -> None:
     c.step(10)
     assert ranges.count == 10
     c.restart("/wayside/wrs1")
-    # It is connected to this process within a second.
     c.run_until(lambda: ranges.count > 10, within_s=2)
     count = ranges.count
     c.step(10)

@@ -16,6 +16,10 @@ from rail_corridor.scenario.model import Scenario
 from .corridor import StalledError, SteppedCorridor
 
 
+#: Wall time for a node in a new process to be heard by all that listen to it [s].
+_HEARD_S = 0.5
+
+
 class Interference:
     """Interferes with a corridor while it stands.
 
@@ -73,6 +77,8 @@ class Interference:
             if not corridor.spin(lambda: said >= {*back}, corridor.timeout_s):
                 lacking = ", ".join(sorted({*back} - said))
                 raise StalledError(f"{lacking}: not ready within {corridor.timeout_s:g} s")
+            # That it hears others it has said; when others hear it cannot be seen from here.
+            corridor.spin(lambda: False, _HEARD_S)
         else:
             back = [name]
             corridor.add_node(make_node(corridor.spec(name), corridor.context, False), name)

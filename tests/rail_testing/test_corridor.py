@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -348,6 +351,30 @@ def test_a_node_that_a_command_starts_is_waited_for(corridor: Make) -> None:
     outcome = c.run_to_end()
     assert outcome.report["failures"] == [] and outcome.report["missing_ticks"] == 0
     assert [view.chainage_m for view in c.topic(POSITION)] == [50.0] * 50
+
+
+@pytest.mark.system
+def test_a_node_that_runs_already_beside_the_others_hears_every_tick(
+    corridor: Make, ros_domain: int, tmp_path: Path
+) -> None:
+    code = OUTSIDE.replace("/wayside/zone_controller/done", "/my/monitor/done")
+    code = code.replace('data="/wayside/zone_controller"', 'data="/my/monitor"')
+    code = code.replace("/wayside/zone_controller/train_a/position", "/my/monitor/heard")
+    code = code.replace("position.get_subscription_count() and ", "")
+    code = code.replace("position.publish(answer)", "print(message.clock.sec, flush=True)")
+    heard = tmp_path / "heard"
+    with heard.open("w") as output:
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(ros_domain)}
+        monitor = subprocess.Popen([sys.executable, "-c", code], stdout=output, env=environment)
+    try:
+        c = corridor("plain_line", duration_s=5.0, domain=ros_domain)
+        c.add(name="/my/monitor")
+        outcome = c.run_to_end()
+        assert outcome.report["failures"] == []
+        assert len(heard.read_text().split()) == 50
+    finally:
+        monitor.kill()
+        monitor.wait()
 
 
 @pytest.mark.system

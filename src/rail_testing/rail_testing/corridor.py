@@ -133,6 +133,7 @@ class Corridor(InterferingMixin):
         replaces: str | None = None,
         attach: bool = True,
         command: Sequence[str] | None = None,
+        name: str | None = None,
         within_s: float | None = None,
     ) -> None:
         """Put a node beside the corridor, or in the place of one of its own.
@@ -147,10 +148,12 @@ class Corridor(InterferingMixin):
         replaces : str, optional
             Full name of a node of the scenario, whose work it does.
         attach : bool
-            Whether no tick begins before its callbacks of the one before have run. A node in a
-            process of its own then answers each tick on ``<name>/done``, if it replaces nothing.
+            Whether no tick begins before its callbacks of the one before have run.
         command : sequence of str, optional
             Starts it in a process of its own, in any language, with the corridor's ROS domain.
+        name : str, optional
+            Full name of a node in a process of its own that replaces nothing: each tick waits for
+            its answer on ``<name>/done``.
         within_s : float, optional
             Wall time that a tick waits for a node that replaces one; then the corridor goes on
             without it until it sends again. The time-out of the corridor if not given.
@@ -164,7 +167,9 @@ class Corridor(InterferingMixin):
             raise InputError("add nodes before the first tick", field="node", value=str(node))
         if replaces is not None:
             self.parameters_of(replaces)
-        self._under_test.add(node, replaces, attach=attach, command=command, within_s=within_s)
+        self._under_test.add(
+            node, replaces, attach=attach, command=command, name=name, within_s=within_s
+        )
 
     # Time --------------------------------------------------------------------------------
 

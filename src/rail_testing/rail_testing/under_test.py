@@ -31,6 +31,7 @@ class _Entry:
     replaces: str | None
     attach: bool
     command: Sequence[str] | None
+    name: str | None
     within_s: float | None
     adoption: Adoption | None = None
     process: subprocess.Popen[bytes] | None = None
@@ -55,12 +56,13 @@ class NodesUnderTest:
         *,
         attach: bool,
         command: Sequence[str] | None,
+        name: str | None,
         within_s: float | None,
     ) -> None:
         """Note a node; see `Corridor.add`."""
-        if node is None and command is None and replaces is None:
+        if node is None and command is None and replaces is None and name is None:
             raise ValueError("a node, a command, or the name of what is replaced is needed")
-        self._entries.append(_Entry(node, replaces, attach, command, within_s))
+        self._entries.append(_Entry(node, replaces, attach, command, name, within_s))
 
     @property
     def replaced(self) -> tuple[str, ...]:
@@ -69,8 +71,9 @@ class NodesUnderTest:
 
     @property
     def awaited(self) -> tuple[str, ...]:
-        """Full names of further nodes that end a tick; none yet that have no name here."""
-        return ()
+        """Full names of further nodes, in processes of their own, that end a tick."""
+        beside = [each for each in self._entries if each.elsewhere and not each.replaces]
+        return tuple(each.name for each in beside if each.name is not None and each.attach)
 
     @property
     def patience(self) -> dict[str, float]:

@@ -95,7 +95,7 @@ class SteppedCorridor:
         domain: int | None = None,
         timeout_s: float = 30.0,
         external: Iterable[str] = (),
-        attached: Iterable[str] = (),
+        attached: tuple[str, ...] = (),
         tap: Tap | None = None,
         placement: Placement = "one",
     ) -> None:
@@ -114,7 +114,7 @@ class SteppedCorridor:
                 attached=attached,
                 observers=(REPORT,),
             )
-            check_external(self.plan, self._external)
+            check_external(self.plan, self._external, attached)
         except BaseException:
             self._remove_directory()
             raise

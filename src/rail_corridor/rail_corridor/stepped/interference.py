@@ -15,7 +15,6 @@ from rail_corridor.scenario.model import Scenario
 
 from .corridor import StalledError, SteppedCorridor
 
-
 #: Wall time for a node in a new process to be heard by all that listen to it [s].
 _HEARD_S = 0.5
 

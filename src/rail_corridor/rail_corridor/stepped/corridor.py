@@ -74,7 +74,7 @@ class SteppedCorridor:
         As ``--timeout`` of ``rail run``.
     external : iterable of str
         Full names of nodes of the plan that are not made: somebody else answers for them.
-    attached : iterable of str
+    attached : tuple of str
         Full names of further nodes whose ``<node>/done`` each tick waits for.
     tap : callable, optional
         Is told of everything that nodes publish.

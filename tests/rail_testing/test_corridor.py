@@ -22,6 +22,7 @@ from rail_corridor.errors import InputError
 from rail_msgs_py.position import Position
 from rail_msgs_py.stamps import to_ns
 from rail_testing import Corridor, Late
+from rail_testing.interception import InterceptorError
 from rail_testing.under_test import NodeError
 from rail_wayside.zone_controller_node import ZoneControllerNode
 
@@ -399,3 +400,59 @@ def test_every_hazard_is_a_figure_of_a_report(corridor: Make) -> None:
         }
         c.close()
     assert found == {path for each in subsystems() for path in each.hazards}
+
+
+@pytest.mark.parametrize("wrong", [lambda _: 1 / 0, lambda: None, lambda _: True])
+def test_an_interceptor_that_fails_fails_the_test(corridor: Make, wrong: Any) -> None:
+    c = corridor("plain_line", duration_s=2.0)
+    c.step(2)
+    c.intercept(POSITION, wrong)
+    with pytest.raises(InterceptorError, match=f"interceptor of {POSITION}: "):
+        c.step()
+    assert c.topic(POSITION).count == 3  # the message has passed as it was
+    assert not c.report()["failures"]
+
+
+def test_a_subscription_that_is_destroyed_hears_no_more(corridor: Make) -> None:
+    class Brief(Node):
+        def __init__(self) -> None:
+            super().__init__("brief")
+            self.seen = 0
+            self.only = self.create_subscription(Clock, "/clock", self._count, 10)
+
+        def _count(self, _: Clock) -> None:
+            self.seen += 1
+            if self.seen == 10:
+                self.destroy_subscription(self.only)
+
+    made: list[Brief] = []
+    c = corridor("plain_line", duration_s=4.0)
+    c.add(lambda: made.append(Brief()) or made[0])
+    c.run_to_end()
+    assert made[0].seen == 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"placement": "two"}, "placement: 'two': must be one of one, site, node"),
+        ({"domain": 999}, "domain: 999: must be from 0 to 232"),
+    ],
+)
+def test_a_wrong_argument_is_one_line(corridor: Make, arguments: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        corridor("plain_line", **arguments).step()
+
+
+def test_what_cannot_be_added_is_refused_at_once(corridor: Make) -> None:
+    c = corridor("plain_line")
+    c.add(PlainController, replaces="/wayside/zone_controller")
+    with pytest.raises(InputError, match="is replaced already"):
+        c.add(PlainController, replaces="/wayside/zone_controller")
+    for wrong in ({"node": Counter, "command": ["ls"]}, {"command": "ls -l"}, {}):
+        with pytest.raises(ValueError, match=r"node|command"):
+            c.add(**wrong)
+    with pytest.raises(TypeError, match="3 is no node"):
+        c.add(3)
+    with pytest.raises(ValueError, match="within_s"):
+        c.add(Counter, within_s=-1.0)

@@ -48,11 +48,13 @@ def test_fails(corridor):
     c.always(lambda: c.time_s < 0.6)
     c.run_for(2)
 
-@pytest.mark.rail(seeds=[1, 2], placements=["one"])
-def test_variants(corridor):
-    c = corridor("plain_line", duration_s=0.3)
-    assert c.placement == "one" and c.seed in (1, 2)
-    c.run_to_end()
+@pytest.mark.rail(seeds=[1, 2])
+class TestVariants:
+    @pytest.mark.rail(placements=["one"])
+    def test_variants(self, corridor):
+        c = corridor("plain_line", duration_s=0.3)
+        assert c.placement == "one" and c.seed in (1, 2)
+        c.run_to_end()
 """
 
 

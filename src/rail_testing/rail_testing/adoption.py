@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message
 
 from rail_corridor.equipment.registry import kind_of
-from rail_msgs_py.delivery import LocalDelivery, LocalReader
+from rail_msgs_py.delivery import Line, LocalDelivery, LocalReader
 
 
 class Adoption:
@@ -36,6 +36,9 @@ class Adoption:
         self._known: set[int] = set()
         #: What its callbacks have raised, in their order.
         self.errors: list[Exception] = []
+        self._readers: dict[int, tuple[Line, LocalReader]] = {}
+        self._destroy = node.destroy_subscription
+        node.destroy_subscription = self._destroy_subscription
         self.look()
 
     def look(self) -> None:
@@ -75,8 +78,17 @@ class Adoption:
 
         subscription.callback = forget
         line.readers.append(reader)
+        self._readers[id(subscription)] = line, reader
         line.subscriptions.append((self.node, hear_outside))
         self._delivery.when_settled(line.hear_outside)
+
+    def _destroy_subscription(self, subscription: Any) -> bool:
+        """In the place of the node's own: what is destroyed hears no more."""
+        line, reader = self._readers.pop(id(subscription), (None, None))
+        if line is not None and reader in line.readers:
+            line.readers = [each for each in line.readers if each is not reader]
+        self._known.discard(id(subscription))
+        return bool(self._destroy(subscription))
 
     def _take_publisher(self, publisher: Any) -> None:
         name = publisher.topic_name

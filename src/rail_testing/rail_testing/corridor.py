@@ -36,7 +36,7 @@ from .conditions import Always, Watched, said_of
 from .evidence import Evidence
 from .interfering import InterferingMixin
 from .outcome import Outcome
-from .scenario_source import scenario_of
+from .scenario_source import checked_placement, scenario_of
 from .under_test import NodesUnderTest
 
 #: Wall time without an answer after which a node counts as failed, as with ``rail run``: a machine
@@ -88,7 +88,7 @@ class Corridor(InterferingMixin):
     ) -> None:
         super().__init__()
         self._scenario = scenario_of(scenario, Overrides(seed=seed, duration_s=duration_s))
-        self.placement = placement
+        self.placement = checked_placement(placement)
         self._timeout_s, self._domain = timeout_s, domain
         self._held = ExitStack()
         self._plan: Plan | None = None
@@ -217,8 +217,7 @@ class Corridor(InterferingMixin):
             self._under_test.after_tick(session)
             if self._histories is not None:
                 self._histories.after_tick()
-            for interception in self._interceptions.values():
-                interception.tick()
+            self._interceptors_after_tick()
             for condition in self._always:
                 condition.check(self._watch, self._where())
         return ticks

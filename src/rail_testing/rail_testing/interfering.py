@@ -13,7 +13,7 @@ from rail_corridor.stepped.corridor import SteppedCorridor
 from rail_corridor.stepped.interference import Interference
 from rail_msgs_py.publisher import CorridorPublisher
 
-from .interception import Interception, Interceptor
+from .interception import Interception, Interceptor, InterceptorError
 from .scenario_source import times_of
 
 
@@ -34,6 +34,15 @@ class InterferingMixin:
 
     def _kind(self, topic: str) -> Any:
         raise NotImplementedError
+
+    def _interceptors_after_tick(self) -> None:
+        """Let what is late come nearer; raise what a function has raised."""
+        for topic, interception in self._interceptions.items():
+            interception.tick()
+            if interception.error is not None:
+                error, interception.error = interception.error, None
+                said = f"{type(error).__name__}: {error}"
+                raise InterceptorError(f"interceptor of {topic}: {said}") from error
 
     def _interfere(self) -> Interference:
         self._running()

@@ -72,16 +72,33 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Run a test with every seed and placement of its marker."""
-    marker = metafunc.definition.get_closest_marker("rail")
-    if marker is None or "_rail_variant" not in metafunc.fixturenames:
+    asked = _asked_of(metafunc.definition)
+    if not asked or "_rail_variant" not in metafunc.fixturenames:
         return
-    seeds = list(marker.kwargs.get("seeds") or [None])
-    placements = list(marker.kwargs.get("placements") or [None])
+    seeds = list(asked.get("seeds") or [None])
+    placements = list(asked.get("placements") or [None])
     variants = [_Variant(*both) for both in itertools.product(seeds, placements)]
     if variants == [_Variant()]:
         return
     names = ["-".join(str(part) for part in each if part is not None) for each in variants]
     metafunc.parametrize("_rail_variant", variants, ids=names, indirect=True)
+
+
+def _asked_of(item: Any) -> dict[str, Any]:
+    """What the markers of a test and of its class say together; the nearest one counts.
+
+    Raises
+    ------
+    UsageError
+        For what the marker does not take.
+    """
+    asked: dict[str, Any] = {}
+    for marker in reversed(list(item.iter_markers("rail"))):
+        unknown = marker.kwargs.keys() - {"seeds", "placements", "repeat"}
+        if unknown or marker.args or isinstance(marker.kwargs.get("seeds"), int):
+            raise pytest.UsageError(f"{item.nodeid}: the marker is {_MARKER}")
+        asked |= marker.kwargs
+    return asked
 
 
 @pytest.fixture
@@ -100,10 +117,9 @@ def corridor(tmp_path: Path, _rail_variant: _Variant) -> Iterator[CorridorFactor
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]:
     """Run a test that is marked so a second time, and compare."""
-    marker = pyfuncitem.get_closest_marker("rail")
     answer = yield
     factory = _factory_of(pyfuncitem)
-    if marker is None or not marker.kwargs.get("repeat") or factory is None:
+    if factory is None or not _asked_of(pyfuncitem).get("repeat"):
         return answer
     from .repeatability import first_difference
 
@@ -112,6 +128,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]
     factory.made.clear()
     arguments = {name: pyfuncitem.funcargs[name] for name in pyfuncitem._fixtureinfo.argnames}
     pyfuncitem.obj(**arguments)
+    if len(before) != len(factory.made):
+        pytest.fail(f"two runs differ: {len(before)} corridors, then {len(factory.made)}")
     for histories, other in zip(before, factory.made, strict=True):
         difference = first_difference(histories, other.histories)
         if difference is not None:

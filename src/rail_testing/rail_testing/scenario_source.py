@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args
 
+from rail_corridor.errors import InputError
 from rail_corridor.loading.loader import load_scenario, scenario_from_data
 from rail_corridor.loading.overrides import Overrides
 from rail_corridor.loading.schema import fault_fields
+from rail_corridor.plan.plan import Placement
 from rail_corridor.scenario.model import Scenario
+
+
+def checked_placement(placement: str) -> Placement:
+    """A placement; InputError if there is none of that name."""
+    for known in get_args(Placement):
+        if placement == known:
+            return cast(Placement, placement)
+    reason = f"must be one of {', '.join(get_args(Placement))}"
+    raise InputError(reason, field="placement", value=placement)
 
 
 def scenario_of(

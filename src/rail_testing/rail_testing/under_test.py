@@ -11,6 +11,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from rclpy.node import Node
+
+from rail_corridor.errors import InputError
 from rail_corridor.stepped.corridor import SteppedCorridor
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.node import SOFTWARE, CorridorMixin
@@ -62,6 +65,16 @@ class NodesUnderTest:
         """Note a node; see `Corridor.add`."""
         if node is None and command is None and replaces is None and name is None:
             raise ValueError("a node, a command, or the name of what is replaced is needed")
+        if node is not None and command is not None:
+            raise ValueError("a node or a command, not both")
+        if isinstance(command, str):
+            raise ValueError(f"a command is a list of words, not {command!r}")
+        if node is not None and not callable(node) and not isinstance(node, Node):
+            raise TypeError(f"{node!r} is no node, and makes none")
+        if within_s is not None and not within_s > 0.0:
+            raise ValueError(f"within_s must be above zero, not {within_s!r}")
+        if replaces is not None and replaces in self.replaced:
+            raise InputError("is replaced already", field="replaces", value=replaces)
         self._entries.append(_Entry(node, replaces, attach, command, name, within_s))
 
     @property

@@ -23,6 +23,8 @@ class _TakenError(InputError):
 
 #: Domains that are chosen from, where any will do.
 _FREE = range(10, 40)
+#: The middleware has ports for no more domains.
+_MOST = 232
 
 
 @contextmanager
@@ -37,6 +39,8 @@ def free_domain(domain: int | None = None, directory: Path | None = None) -> Ite
     InputError
         If the given one, or every one, is taken.
     """
+    if domain is not None and not 0 <= domain <= _MOST:
+        raise InputError(f"must be from 0 to {_MOST}", field="domain", value=domain)
     start = os.getpid() + next(_TURN) * 7
     turns = range(start, start + len(_FREE))
     candidates = [domain] if domain is not None else [_FREE[n % len(_FREE)] for n in turns]

@@ -7,6 +7,7 @@ calls. The digest is that of ``rail run``.
 from __future__ import annotations
 
 import contextlib
+import difflib
 import gc
 import shutil
 import sys
@@ -250,8 +251,10 @@ class SteppedCorridor:
         for spec in self.plan.nodes:
             if spec.name == name:
                 return spec
-        check_external(self.plan, [name])
-        raise InputError("nothing goes on without the world", field="node", value=name)
+        known = [spec.name for spec in self.plan.nodes]
+        close = difflib.get_close_matches(name, known, n=1)
+        reason = "the corridor has no such node" + (f", did you mean {close[0]}" if close else "")
+        raise InputError(reason, field="node", value=name)
 
     # Ticks -------------------------------------------------------------------------------
 

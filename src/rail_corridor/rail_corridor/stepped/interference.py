@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
@@ -17,6 +18,22 @@ from .corridor import StalledError, SteppedCorridor
 
 #: Wall time for a node in a new process to be heard by all that listen to it [s].
 _HEARD_S = 0.5
+
+
+def _silence(node: Any) -> None:
+    """Let a node hear and do nothing more.
+
+    It stays with the executor: that of these wheels may fault when it forgets a node to which
+    something is under way.
+    """
+
+    def hear_nothing(_: Any) -> None:
+        pass
+
+    for subscription in node.subscriptions:
+        subscription.callback = hear_nothing
+    for timer in node.timers:
+        timer.cancel()
 
 
 class Interference:
@@ -47,7 +64,7 @@ class Interference:
         else:
             node = corridor.node(name)
             del corridor.nodes[name]
-            corridor.executor.remove_node(node)
+            _silence(node)
             corridor.delivery.remove(node)
             corridor.dead.append(node)
             killed, reason = [name], "killed"

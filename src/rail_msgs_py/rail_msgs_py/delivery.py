@@ -168,6 +168,8 @@ class LocalDelivery:
     """Hands the messages of one process from node to node."""
 
     def __init__(self) -> None:
+        #: Whether messages may be intercepted on their lines; known before publishers are made.
+        self.intercepts = False
         self._ears: dict[str, Ear] = {}
         self._lines: dict[str, Line] = {}
         self._queue: deque[tuple[Callable[[Any], None], Any, LocalReader]] = deque()

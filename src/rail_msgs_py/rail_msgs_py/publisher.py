@@ -71,11 +71,11 @@ class CorridorPublisher:
             if self._carried:
                 publish_raw(serialised(message) if raw is None else raw)
 
+        if line is None or delivery is None or not delivery.intercepts:
+            return send_on
+
         def send(message: Sendable) -> None:
-            if line is None or line.intercept is None:
-                send_on(message)
-                return
-            for each in line.intercept(message):
+            for each in (message,) if line.intercept is None else line.intercept(message):
                 send_on(each)
 
         return send

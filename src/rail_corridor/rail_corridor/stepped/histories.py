@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import difflib
-import importlib
 from typing import Any
 
 from rail_corridor.equipment.registry import kind_of
 from rail_corridor.errors import InputError
 from rail_corridor.report.intake import names_read
 from rail_msgs_py.delivery import LocalReader
+from rail_msgs_py.message_definition import message_class
 from rail_msgs_py.waveform import Waveform
 
 from .corridor import SteppedCorridor
@@ -103,8 +103,7 @@ class Histories:
         """Message class of a topic that others publish."""
         for found, types in self._node.get_topic_names_and_types():
             if found == name:
-                package, _, message = types[0].partition("/msg/")
-                return getattr(importlib.import_module(f"{package}.msg"), message)
+                return message_class(types[0])
         close = difflib.get_close_matches(name, self.names, n=1)
         reason = "nobody sends on it" + (f", did you mean {close[0]}" if close else "")
         raise InputError(reason, field="topic", value=name)

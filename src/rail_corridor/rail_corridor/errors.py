@@ -25,6 +25,18 @@ class _Missing:
 MISSING: Final = _Missing()
 
 
+def did_you_mean(name: str, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """The end of a sentence that tells of the known name nearest to a wrong one, if one is near.
+
+    >>> did_you_mean("/wayside/wrs11", ["/wayside/wrs1", "/world"])
+    ', did you mean /wayside/wrs1'
+    >>> did_you_mean("frobnicate", ["/world"])
+    ''
+    """
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=cutoff)
+    return f", did you mean {close[0]}" if close else ""
+
+
 class InputError(Exception):
     """Input that cannot be used; its text is one line for the user.
 
@@ -96,9 +108,7 @@ def from_validation(
     if first["type"] == "extra_forbidden":
         path = [*_real_path(first["loc"][:-1], data), first["loc"][-1]]
         reason = "there is no such field"
-        close = difflib.get_close_matches(str(path[-1])[:60], known_names, n=1, cutoff=0.75)
-        if close:
-            reason += f", did you mean {close[0]}"
+        reason += did_you_mean(str(path[-1])[:60], known_names, cutoff=0.75)
         return InputError(reason, field=_dotted(path), value=first["input"])
     path = _real_path(first["loc"], data)
     value = first["input"]

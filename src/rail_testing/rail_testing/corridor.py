@@ -121,10 +121,7 @@ class Corridor(InterferingMixin):
 
     def parameters_of(self, node: str) -> dict[str, Any]:
         """ROS parameters that the scenario gives a node, by its full name."""
-        for spec in self._planned().nodes:
-            if spec.name == node:
-                return dict(spec.parameters)
-        raise InputError("the corridor has no such node", field="node", value=node)
+        return dict(self._planned().node(node).parameters)
 
     def add(
         self,

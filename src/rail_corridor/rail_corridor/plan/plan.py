@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from rail_corridor.equipment.registry import (
     supervision_of,
 )
 from rail_corridor.equipment.subsystem import PlanContext
-from rail_corridor.errors import InputError
+from rail_corridor.errors import InputError, did_you_mean
 from rail_corridor.run_data import RecordSpec, RunData, in_one_message
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.world import STATE
@@ -59,6 +58,15 @@ class Plan:
     world: WorldFile
     records: tuple[RecordSpec, ...]
 
+    def node(self, name: str) -> NodeSpec:
+        """A node by its full name; InputError if there is none."""
+        for spec in self.nodes:
+            if spec.name == name:
+                return spec
+        reason = "the corridor has no such node"
+        reason += did_you_mean(name, [spec.name for spec in self.nodes])
+        raise InputError(reason, field="node", value=name)
+
     def groups(
         self, placement: Placement, only: Part | None = None, external: Iterable[str] = ()
     ) -> dict[str, list[NodeSpec]]:
@@ -93,12 +101,10 @@ def check_external(plan: Plan, external: Iterable[str], attached: Iterable[str] 
     _check_attached(plan, attached)
     known = [spec.name for spec in plan.nodes if spec.name != WORLD]
     for name in external:
-        if name in known:
-            continue
-        close = difflib.get_close_matches(name, known, n=1)
-        reason = "the corridor has no such node that could be replaced"
-        reason += f", did you mean {close[0]}" if close else ""
-        raise InputError(reason, field="--external", value=name)
+        if name not in known:
+            reason = "the corridor has no such node that could be replaced"
+            reason += did_you_mean(name, known)
+            raise InputError(reason, field="--external", value=name)
 
 
 def _check_attached(plan: Plan, attached: Iterable[str]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import signal
 import threading
 import time
@@ -22,7 +21,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from rail_corridor.equipment.registry import kind_of
-from rail_corridor.errors import InputError
+from rail_corridor.errors import InputError, did_you_mean
 from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.middleware.domain import sole_corridor
 from rail_corridor.yaml_file import parse_yaml
@@ -148,8 +147,7 @@ def offers_of(channels: Iterable[RecordedChannel], wanted: Iterable[str]) -> dic
     recorded = {channel.topic: channel for channel in channels}
     names = {*wanted}
     for name in sorted(names - recorded.keys()):
-        close = difflib.get_close_matches(name, recorded, n=1)
-        reason = "was not recorded" + (f", did you mean {close[0]}" if close else "")
+        reason = f"was not recorded{did_you_mean(name, recorded)}"
         raise InputError(reason, field="--topics", value=name)
     names = names | {CLOCK.name()} if names else {*recorded}
     return {name: _offer_of(recorded[name]) for name in sorted(names & recorded.keys())}

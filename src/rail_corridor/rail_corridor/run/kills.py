@@ -7,13 +7,12 @@ nothing any more. Either way the launcher tells the corridor, as it does of ever
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rail_corridor.equipment.node_spec import NodeSpec
-from rail_corridor.errors import InputError
+from rail_corridor.errors import InputError, did_you_mean
 
 _OPTION = "--kill"
 
@@ -74,9 +73,7 @@ def check_kills(
     for kill in kills:
         if kill.node not in process:
             known = [name for name in process if name != world]
-            close = difflib.get_close_matches(kill.node, known, n=1)
-            reason = "no such node runs here"
-            reason += f", did you mean {close[0]}" if close else ""
+            reason = f"no such node runs here{did_you_mean(kill.node, known)}"
         elif kill.node == world:
             reason = "nothing goes on without the world"
         elif not one and process[kill.node] == process.get(world):

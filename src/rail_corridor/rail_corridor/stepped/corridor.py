@@ -7,7 +7,6 @@ calls. The digest is that of ``rail run``.
 from __future__ import annotations
 
 import contextlib
-import difflib
 import gc
 import shutil
 import sys
@@ -244,13 +243,7 @@ class SteppedCorridor:
 
     def spec(self, name: str) -> NodeSpec:
         """What the plan has of a node; InputError if it has none of that name."""
-        for spec in self.plan.nodes:
-            if spec.name == name:
-                return spec
-        known = [spec.name for spec in self.plan.nodes]
-        close = difflib.get_close_matches(name, known, n=1)
-        reason = "the corridor has no such node" + (f", did you mean {close[0]}" if close else "")
-        raise InputError(reason, field="node", value=name)
+        return self.plan.node(name)
 
     # Ticks -------------------------------------------------------------------------------
 

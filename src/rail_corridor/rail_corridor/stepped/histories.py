@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import Any
 
 from rail_corridor.equipment.registry import kind_of
-from rail_corridor.errors import InputError
+from rail_corridor.errors import InputError, did_you_mean
 from rail_corridor.report.intake import names_read
 from rail_msgs_py.delivery import LocalReader
 from rail_msgs_py.message_definition import message_class
@@ -104,8 +103,7 @@ class Histories:
         for found, types in self._node.get_topic_names_and_types():
             if found == name:
                 return message_class(types[0])
-        close = difflib.get_close_matches(name, self.names, n=1)
-        reason = "nobody sends on it" + (f", did you mean {close[0]}" if close else "")
+        reason = f"nobody sends on it{did_you_mean(name, self.names)}"
         raise InputError(reason, field="topic", value=name)
 
     @staticmethod

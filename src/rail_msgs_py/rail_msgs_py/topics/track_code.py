@@ -13,6 +13,20 @@ from .column import Column
 from .qos import ESTIMATE, STREAM
 from .topic import Topic
 
+#: Fields of the message in a code, sent or received.
+_FIELDS: Final = (
+    Column(
+        "speed",
+        "two indices into the table of 16 speeds: 16 times that of the speed allowed in the "
+        "block, plus that of the one allowed at its end",
+    ),
+    Column(
+        "gradient",
+        "of the block in steps of 5 ‰ from -50 ‰ on, rounded downhill: 10 is level",
+    ),
+    Column("block_length", "of the block in steps of 25 m, rounded down"),
+    Column("network", "number of the network, 0 to 7; the circuits here send 0"),
+)
 CIRCUIT_TX: Final = Topic(
     "/wayside/{circuit}/track_code/feed_end",
     Float64MultiArray,
@@ -65,17 +79,7 @@ CODE_SENT: Final = Topic(
             "the bits of the code as a number, the lowest tone least significant; NaN in every "
             "column if the circuit is switched off",
         ),
-        Column(
-            "speed",
-            "two indices into the table of 16 speeds: 16 times that of the speed allowed in the "
-            "block, plus that of the one allowed at its end",
-        ),
-        Column(
-            "gradient",
-            "of the block in steps of 5 ‰ from -50 ‰ on, rounded downhill: 10 is level",
-        ),
-        Column("block_length", "of the block in steps of 25 m, rounded down"),
-        Column("network", "number of the network, 0 to 7; the circuits here send 0"),
+        *_FIELDS,
     ),
 )
 CODE_RX: Final = Topic(
@@ -103,17 +107,7 @@ CODE_RECEIVED: Final = Topic(
             "and the word are then 0",
         ),
         Column("word", "the bits of the code as a number, the lowest tone least significant"),
-        Column(
-            "speed",
-            "two indices into the table of 16 speeds: 16 times that of the speed allowed in the "
-            "block, plus that of the one allowed at its end",
-        ),
-        Column(
-            "gradient",
-            "of the block in steps of 5 ‰ from -50 ‰ on, rounded downhill: 10 is level",
-        ),
-        Column("block_length", "of the block in steps of 25 m, rounded down"),
-        Column("network", "number of the network, 0 to 7; the circuits here send 0"),
+        *_FIELDS,
         Column(
             "level_db",
             "in the band of the carrier in force, 0 dB being a wave of amplitude 1; minus "

@@ -100,9 +100,9 @@ def test_a_station_killed_in_the_one_process_comes_back_in_one_of_its_own(
     assert train["phase_ranging"]["availability"] == 1.0
 
 
-@pytest.mark.parametrize(("scenario", "limit_s"), [("demo", 3.0), ("moving_block", 12.0)])
+@pytest.mark.parametrize("scenario", ["demo", "moving_block"])
 def test_every_node_lists_its_parameters_promptly(
-    rail: Rail, listener: Listener, tmp_path: Path, scenario: str, limit_s: float
+    rail: Rail, listener: Listener, tmp_path: Path, scenario: str
 ) -> None:
     clock = listener.listen(CLOCK)
     run = rail.start("run", scenario, "--rate", 1, "--no-switches", "--processes", "one")
@@ -117,7 +117,8 @@ def test_every_node_lists_its_parameters_promptly(
         listed = client.list_parameters([])
         listener.until(listed.done)
         assert "use_sim_time" in listed.result().result.names
-    assert time.monotonic() - begun_s < limit_s
+    # A node that is not served is waited for in vain, five seconds each.
+    assert time.monotonic() - begun_s < 2.0 * len(names)
     client = AsyncParameterClient(node, "/wayside/wrs3")
     assert client.wait_for_services(5.0)
     got = client.get_parameters(["power_dbm"])

@@ -8,6 +8,7 @@ random process bounds the false-alarm probability of the maximum.
 
 from __future__ import annotations
 
+import functools
 import math
 
 from scipy.special import betainc, betaln
@@ -47,12 +48,13 @@ def false_alarm_probability(
     return tail + search_hz * rate
 
 
+@functools.cache
 def detection_threshold(
     false_alarm: float, components: int, dimensions: int, search_hz: float, duration_s: float
 ) -> float:
     """Fraction of the energy above which components count as detected.
 
-    Solves `false_alarm_probability` for its first argument.
+    Solves `false_alarm_probability` for its first argument, once for all receivers of a kind.
 
     Raises
     ------

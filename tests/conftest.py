@@ -5,10 +5,13 @@ from __future__ import annotations
 import fcntl
 import itertools
 import os
+import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -84,3 +87,14 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the two long groups; the short tests fill what time they leave."""
     items.sort(key=lambda item: item.get_closest_marker("system") is None)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any, error: object) -> None:
+    """Say how a worker of pytest-xdist ended that was not to end: by which signal, or which code."""
+    if error is None:
+        return
+    process = node.gateway._io.popen
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(timeout=5.0)
+    print(f"\n{node.gateway.id} ended with {process.returncode}", file=sys.stderr)

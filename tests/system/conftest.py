@@ -66,8 +66,13 @@ class Rail:
         inherited = {k: v for k, v in os.environ.items() if k != "FASTDDS_BUILTIN_TRANSPORTS"}
         return {**inherited, **mine}
 
-    def start(self, *arguments: object, command: list[str] | None = None) -> subprocess.Popen[str]:
-        """Start ``rail`` or another command; its output goes to files."""
+    def start(
+        self,
+        *arguments: object,
+        command: list[str] | None = None,
+        transports: str = "DEFAULT",
+    ) -> subprocess.Popen[str]:
+        """Start ``rail`` or another command, on these transports; its output goes to files."""
         number = len(self.started)
         with (
             (self.directory / f"stdout_{number}").open("w") as stdout,
@@ -81,7 +86,7 @@ class Rail:
                 stdout=stdout,
                 stderr=stderr,
                 text=True,
-                env=self.environment,
+                env=self.environment | {"FASTDDS_BUILTIN_TRANSPORTS": transports},
                 cwd=self.directory,
             )
         self.started.append(process)

@@ -40,7 +40,8 @@ class ProcessGroup:
 
     def __init__(self) -> None:
         self.children: list[Child] = []
-        self._read_end, self._write_end = os.pipe()
+        #: Of a pipe: the end that children read, and the one that closes with this process.
+        self._ends: tuple[int, ...] = os.pipe()
 
     def start(self, name: str, work: Callable[[], None]) -> Child:
         """Fork a process that does ``work``."""
@@ -61,13 +62,15 @@ class ProcessGroup:
             os.setsid()
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
-            os.close(self._write_end)
+            read_end, write_end = self._ends
+            os.close(write_end)
+            self._ends = (read_end,)
             # The name that ps, top and pkill show.
             Path("/proc/self/comm").write_text(f"rail_{name}"[:15])
-            die_with(self._read_end)
+            die_with(read_end)
             work()
             code = 0
-            if select.select([self._read_end], [], [], 0.0)[0]:
+            if select.select([read_end], [], [], 0.0)[0]:
                 self._tidy_up_in_place_of_the_launcher()
         except BaseException:
             traceback.print_exc()
@@ -119,9 +122,9 @@ class ProcessGroup:
 
     def close(self) -> None:
         """Let go of the pipe that ties the children to this process, as a sibling of them must."""
-        for end in (self._read_end, self._write_end):
-            with contextlib.suppress(OSError):
-                os.close(end)
+        ends, self._ends = self._ends, ()
+        for end in ends:
+            os.close(end)
 
     def _alive(self) -> list[Child]:
         return [child for child in self.children if not child.ended]

@@ -91,7 +91,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any, error: object) -> None:
-    """Say how a worker of pytest-xdist ended that was not to end: by which signal, or which code."""
+    """Say how a worker of pytest-xdist ended that was not to end: by which signal or code."""
     if error is None:
         return
     process = node.gateway._io.popen

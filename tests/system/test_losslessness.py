@@ -29,8 +29,8 @@ def test_a_report_that_stands_still_for_a_hundred_ticks_misses_none(
 ) -> None:
     path = rail.directory / "report.json"
     clock, observed = listener.listen(CLOCK), listener.listen(OBSERVED)
-    # Paced, so that the report stops long before the end; not in shared memory, where a process that
-    # is stopped may hold the lock of a port (Fast DDS issue 6485).
+    # Paced, so that the report stops long before the end; not in shared memory, where a process
+    # that is stopped may hold the lock of a port (Fast DDS issue 6485).
     run = rail.start(
         *("run", *_RUN, "--rate", 15, "--processes", "site", "--report", path), transports="UDPv4"
     )

@@ -106,6 +106,8 @@ class Line:
     kind: Any = None
     #: What becomes of each message before anybody is told of it; as it is, if there is none.
     intercept: Callable[[Sendable], Iterable[Sendable]] | None = None
+    #: On a bench: what was sent before all nodes were made, for those who read later.
+    early: list[Sendable] = field(default_factory=list)
     #: Subscriptions to the outside that nobody has needed yet, and whose they would be.
     subscriptions: list[tuple[Any, Callable[[], None]]] = field(default_factory=list)
 
@@ -196,12 +198,17 @@ class LocalDelivery:
         self.when_settled(line.hear_outside)
         return line
 
+    @property
+    def settled(self) -> bool:
+        """Whether all nodes are made."""
+        return self._executor is not None
+
     def when_settled(self, callback: Callable[[], None]) -> None:
         """Call back once all nodes are made, at once if they are."""
-        if self._executor is None:
-            self._unsettled.append(callback)
-        else:
+        if self.settled:
             callback()
+        else:
+            self._unsettled.append(callback)
 
     def listen(self, name: str, listener: Listener) -> None:
         """Listen to a topic of many publishers, or a timer, by the one that the process has."""

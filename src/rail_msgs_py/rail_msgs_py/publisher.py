@@ -76,6 +76,8 @@ class CorridorPublisher:
 
         def send(message: Sendable) -> None:
             for each in (message,) if line.intercept is None else line.intercept(message):
+                if not delivery.settled:
+                    line.early.append(each)
                 send_on(each)
 
         return send

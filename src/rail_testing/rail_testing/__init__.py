@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .corridor import Corridor
-    from .interception import Late
+    from .interception import InterceptorError, Late
     from .outcome import Outcome
     from .repeatability import Difference, first_difference
+    from .under_test import NodeError
 
 _FOUND_IN = {
     "Corridor": "corridor",
+    "InterceptorError": "interception",
     "Late": "interception",
+    "NodeError": "under_test",
     "Outcome": "outcome",
     "Difference": "repeatability",
     "first_difference": "repeatability",
@@ -31,4 +34,12 @@ def __getattr__(name: str) -> Any:
     return getattr(import_module(f"{__name__}.{_FOUND_IN[name]}"), name)
 
 
-__all__ = ["Corridor", "Difference", "Late", "Outcome", "first_difference"]
+__all__ = [
+    "Corridor",
+    "Difference",
+    "InterceptorError",
+    "Late",
+    "NodeError",
+    "Outcome",
+    "first_difference",
+]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
+from types import CodeType
 from typing import Any
 
 from rail_corridor.stepped.topics import TopicHistory
@@ -56,21 +58,48 @@ def said_of(condition: Callable[[], Any]) -> str:
 
     >>> said_of(lambda: 1 + 1 == 3)
     'lambda: 1 + 1 == 3'
+    >>> [said_of(each) for each in (lambda: 1 < 0, lambda: max(2, 3) < 0)]
+    ['lambda: 1 < 0', 'lambda: max(2, 3) < 0']
     """
     try:
         source = " ".join(inspect.getsource(condition).split())
     except (OSError, TypeError):
         return getattr(condition, "__name__", repr(condition))
-    if "lambda" not in source:
+    lambdas = list(_lambdas_in(source))
+    if not lambdas:
         return condition.__name__
-    text = source[source.index("lambda") :]
-    # Up to the bracket or comma that is not the lambda's own.
-    depth = 0
-    for place, sign in enumerate(text):
-        if sign in "([{":
-            depth += 1
-        elif sign in ")]}":
-            depth -= 1
-        if depth < 0 or (sign == "," and depth == 0):
-            return text[:place]
-    return text
+    meant = condition.__code__
+    return next((said for said in lambdas if _means(said, meant)), lambdas[0])
+
+
+def _lambdas_in(source: str) -> Iterator[str]:
+    """Every lambda of a source, up to the bracket or comma that is not its own."""
+    for found in re.finditer(r"\blambda\b", source):
+        text, depth = source[found.start() :], 0
+        arguments = True
+        for place, sign in enumerate(text):
+            depth += (sign in "([{") - (sign in ")]}")
+            arguments = arguments and sign != ":"
+            if depth < 0 or (sign == "," and depth == 0 and not arguments):
+                text = text[:place]
+                break
+        yield text.rstrip()
+
+
+def _means(said: str, code: CodeType) -> bool:
+    """Whether a lambda may be that of a code: the same names and constants in it."""
+    try:
+        (own,) = (
+            each for each in compile(said, "", "eval").co_consts if isinstance(each, CodeType)
+        )
+    except (SyntaxError, ValueError):
+        return False
+    return _content(own) == _content(code)
+
+
+def _content(code: CodeType) -> tuple[set[str], list[str]]:
+    inner = [each for each in code.co_consts if isinstance(each, CodeType)]
+    names = {*code.co_names, *code.co_freevars}.union(*(_content(each)[0] for each in inner))
+    plain = [repr(each) for each in code.co_consts if not isinstance(each, CodeType | str)]
+    words = [each for each in code.co_consts if isinstance(each, str) and "<" not in each]
+    return names, sorted({*plain, *words} - {"None"})

@@ -6,13 +6,11 @@
     assert c.truth("second").front_m < c.topic("/second/atp/state").latest.end_of_authority_m
     c.close()
 
-Units are seconds and metres. Times that are given are simulated ones, unless they are called wall
-time.
+Units are seconds and metres. Times are simulated ones, unless they are called wall time.
 """
 
 from __future__ import annotations
 
-import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -32,12 +30,13 @@ from rail_corridor.stepped.interference import Interference
 from rail_corridor.stepped.topics import NotKnownError, TopicHistory
 from rail_corridor.stepped.truth import Truth
 
+from .checked import checked_condition, checked_placement, checked_ticks, ticks_in
 from .conditions import Always, Watched, said_of
-from .evidence import Evidence
+from .evidence import Evidence, said_of_health
 from .interfering import InterferingMixin
 from .outcome import Outcome
-from .scenario_source import checked_placement, scenario_of
-from .under_test import NodesUnderTest
+from .scenario_source import scenario_of
+from .under_test import NodesUnderTest, UnderTest
 
 #: Wall time without an answer after which a node counts as failed, as with ``rail run``: a machine
 #: that is busy with other tests must not make one fail.
@@ -132,7 +131,7 @@ class Corridor(InterferingMixin):
         command: Sequence[str] | None = None,
         name: str | None = None,
         within_s: float | None = None,
-    ) -> None:
+    ) -> UnderTest:
         """Put a node beside the corridor, or in the place of one of its own.
 
         Before the first tick. Of a kind derived from `rail_msgs_py.tick_node` the scenario's name
@@ -155,6 +154,11 @@ class Corridor(InterferingMixin):
             Wall time that a tick waits for a node that replaces one; then the corridor goes on
             without it until it sends again. The time-out of the corridor if not given.
 
+        Returns
+        -------
+        UnderTest
+            Its ``node`` is the node itself, once the corridor has started.
+
         Raises
         ------
         InputError
@@ -164,7 +168,7 @@ class Corridor(InterferingMixin):
             raise InputError("add nodes before the first tick", field="node", value=str(node))
         if replaces is not None:
             self.parameters_of(replaces)
-        self._under_test.add(
+        return self._under_test.add(
             node, replaces, attach=attach, command=command, name=name, within_s=within_s
         )
 
@@ -202,16 +206,16 @@ class Corridor(InterferingMixin):
         AssertionError
             If a condition of `always` does not hold any longer.
         NodeError
-            If a callback of a node under test has raised.
+            If a callback of a node under test has raised, or one gives no answer any longer.
         StalledError
             If a tick does not end.
         """
         __tracebackhide__ = True
         session = self._running()
-        for number in range(ticks):
+        for number in range(checked_ticks(ticks)):
             if not session.step():
                 return number
-            self._under_test.after_tick(session)
+            self._under_test.after_tick(session, self._killed)
             if self._histories is not None:
                 self._histories.after_tick()
             self._interceptors_after_tick()
@@ -222,7 +226,7 @@ class Corridor(InterferingMixin):
     def run_for(self, seconds: float) -> None:
         """Run for a time, or to the end of the run if that comes first."""
         __tracebackhide__ = True
-        self.step(max(1, math.ceil(seconds / self.tick_s - 1e-9)))
+        self.step(ticks_in(seconds, self.tick_s, "seconds"))
 
     def run_until(self, condition: Callable[[], Any], *, within_s: float) -> float:
         """Run until something is the case.
@@ -238,8 +242,9 @@ class Corridor(InterferingMixin):
             If it is not within ``within_s``, or the run has ended; says what was last seen.
         """
         __tracebackhide__ = True
+        checked_condition(condition)
         begun_s = self.time_s if self.ticks else -self.tick_s
-        for _ in range(math.ceil(within_s / self.tick_s - 1e-9)):
+        for _ in range(ticks_in(within_s, self.tick_s, "within_s")):
             if not self.step():
                 break
             if self._watch(condition)[0]:
@@ -254,7 +259,7 @@ class Corridor(InterferingMixin):
         It is not decided in a tick in which it compares a value that is not known; at the end of
         the run it must have been decided at least once.
         """
-        self._always.append(Always(condition))
+        self._always.append(Always(checked_condition(condition)))
 
     def run_to_end(self) -> Outcome:
         """Run to the end of the scenario."""
@@ -317,15 +322,10 @@ class Corridor(InterferingMixin):
 
     def last_seen(self) -> str:
         """Where the run stands, and what nodes last said of their health: for a failed test."""
+        what = f"{self._scenario.name}, seed {self.seed}"
         if self._session is None:
-            return f"{self._scenario.name}, seed {self.seed}: not started"
-        lines = [f"{self._scenario.name}, seed {self.seed}, {self._where()}"]
-        lines += [
-            f"  {event['level']:5} {event['time_s']:8.2f} s  {event['name']}: {event['message']}"
-            for event in self._session.observer.intake.events[-8:]
-            if event["level"] != "ok"
-        ]
-        return "\n".join(lines)
+            return f"{what}: not started"
+        return f"{what}, {self._where()}{said_of_health(self._session.observer.intake.events)}"
 
     def close(self) -> None:
         """End everything; harmless when called again."""
@@ -370,13 +370,17 @@ class Corridor(InterferingMixin):
         )
         try:
             self._interference = Interference(self._session)
-            self._under_test.enter(self._session, domain)
+            self._under_test.enter(self._session, domain, self._said)
             self._histories = Histories(self._session)
             self._session.start()
-            self._under_test.after_tick(self._session)
+            self._under_test.after_tick(self._session, self._killed)
         except BaseException:
             self.close()
             raise
+
+    def _said(self, topic: str) -> Sequence[Any]:
+        history = self.histories.get(topic)
+        return () if history is None else history.sent
 
     def _kind(self, topic: str) -> Any:
         assert self._histories is not None
@@ -393,4 +397,4 @@ class Corridor(InterferingMixin):
         return value, Watched({name: self._histories[name] for name in self._watched})
 
     def _where(self) -> str:
-        return f"tick {self.ticks - 1} ({self.time_s:.2f} s)"
+        return f"tick {self.ticks - 1} ({self.time_s:.2f} s)" if self.ticks else "before tick 0"

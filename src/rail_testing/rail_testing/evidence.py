@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,15 @@ if os.fork() == 0:
 os.close(write)
 record(path, path.open("wb"), [read], [], {})
 """
+
+
+def said_of_health(events: Sequence[Mapping[str, Any]]) -> str:
+    """What nodes last said of their health, where it was not well: a line each."""
+    return "".join(
+        f"\n  {event['level']:5} {event['time_s']:8.2f} s  {event['name']}: {event['message']}"
+        for event in events[-8:]
+        if event["level"] != "ok"
+    )
 
 
 class Evidence:
@@ -69,6 +79,8 @@ class Evidence:
         if self._tap is None or self._frames is None or target is None:
             return None
         self._tap.flush()
+        if not self._frames.stat().st_size:
+            return None
         done = subprocess.run(
             [sys.executable, "-c", _WRITE, str(self._frames), str(target)],
             capture_output=True,

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rail_corridor.equipment.registry import kind_of
+from rail_corridor.errors import InputError
 from rail_corridor.loading.loader import scenario_from_data
 from rail_corridor.plan.plan import Plan
 from rail_corridor.scenario.model import Scenario
@@ -28,6 +30,8 @@ class InterferingMixin:
     def __init__(self) -> None:
         self._interceptions: dict[str, Interception] = {}
         self._publishers: dict[str, CorridorPublisher] = {}
+        #: Nodes that the test has killed.
+        self._killed: set[str] = set()
 
     def _running(self) -> SteppedCorridor:
         raise NotImplementedError
@@ -50,8 +54,18 @@ class InterferingMixin:
         return self._interference
 
     def publish(self, topic: str, message: Any) -> None:
-        """Send a message of ROS, a view of `rail_msgs_py`, or a serialised message."""
+        """Send a message of ROS, a view of `rail_msgs_py`, or a serialised message.
+
+        Raises
+        ------
+        InputError
+            If it is none of the topic.
+        """
         session = self._running()
+        known = kind_of(topic)
+        kinds = () if known is None else (known.type, known.view, bytes)
+        if known is not None and not isinstance(message, tuple(filter(None, kinds))):
+            raise InputError(f"must be of {known.type.__name__}", field=topic, value=message)
         if topic not in self._publishers:
             self._publishers[topic] = session.publisher(topic, type(message))
         publisher = self._publishers[topic]
@@ -73,6 +87,10 @@ class InterferingMixin:
         LookupError
             If it is of a kind that is read at the start alone, and the run has begun.
         """
+        given: Any = fault
+        if not isinstance(given, Mapping):
+            reason = "must be a mapping with kind, as in the list of a scenario"
+            raise InputError(reason, field="faults", value=given)
         data = self._scenario.model_dump(mode="json", exclude_unset=True)
         kind = str(fault.get("kind", ""))
         complete = {**times_of(kind, self._next_s), **fault}
@@ -93,9 +111,11 @@ class InterferingMixin:
     def kill(self, node: str) -> None:
         """End a node as if its process had been killed."""
         self._interfere().kill(node)
+        self._killed.add(node)
 
     def restart(self, node: str) -> None:
         """Start a node anew, whether or not it is alive."""
+        self._killed.add(node)
         self._interfere().restart(node)
 
     def intercept(self, topic: str, function: Interceptor | None) -> Interception | None:

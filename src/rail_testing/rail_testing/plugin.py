@@ -164,5 +164,7 @@ def _said(corridor: Corridor, item: pytest.Item) -> str:
     else:
         if kept is not None:
             lines.append(f"recording: {kept}")
-    lines.append(f"again: pytest '{item.nodeid}'")
+    # Where tests are divided among workers, the name ends with the group of the test.
+    name = item.nodeid.rpartition("@")[0] if item.get_closest_marker("xdist_group") else ""
+    lines.append(f"again: pytest '{name or item.nodeid}'")
     return "\n".join(lines)

@@ -4,29 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any
 
 from rail_corridor.errors import InputError
 from rail_corridor.loading.loader import load_scenario, scenario_from_data
 from rail_corridor.loading.overrides import Overrides
 from rail_corridor.loading.schema import fault_fields
-from rail_corridor.plan.plan import Placement
 from rail_corridor.scenario.model import Scenario
 
 
-def checked_placement(placement: str) -> Placement:
-    """A placement; InputError if there is none of that name."""
-    for known in get_args(Placement):
-        if placement == known:
-            return cast(Placement, placement)
-    reason = f"must be one of {', '.join(get_args(Placement))}"
-    raise InputError(reason, field="placement", value=placement)
-
-
-def scenario_of(
-    scenario: str | Path | Mapping[str, Any] | Scenario, overrides: Overrides
-) -> Scenario:
+def scenario_of(scenario: Any, overrides: Overrides) -> Scenario:
     """The scenario, with what is changed in it.
+
+    Parameters
+    ----------
+    scenario : str, Path, mapping or Scenario
+        As `rail_testing.corridor.Corridor` has it.
+    overrides : Overrides
 
     Raises
     ------
@@ -37,8 +31,11 @@ def scenario_of(
         return load_scenario(scenario, overrides=overrides)
     if isinstance(scenario, Scenario):
         data = scenario.model_dump(mode="json", exclude_unset=True)
-    else:
+    elif isinstance(scenario, Mapping):
         data = dict(scenario)
+    else:
+        reason = "must be a name, a file, the data of a file, or a Scenario"
+        raise InputError(reason, field="scenario", value=scenario)
     if overrides.seed is not None:
         data["seed"] = overrides.seed
     if overrides.duration_s is not None:

@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,7 +19,7 @@ from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.node import SOFTWARE, CorridorMixin
 from rail_msgs_py.topics.tick import DONE
 
-from .adoption import Adoption
+from .adoption import Adoption, Past
 
 _GRACE_S = 3.0
 
@@ -29,16 +29,28 @@ class NodeError(RuntimeError):
 
 
 @dataclass
-class _Entry:
+class UnderTest:
+    """One node that a test has added.
+
+    Attributes
+    ----------
+    node : rclpy Node
+        Once the corridor has started, if it is in this process; until then what makes it.
+    process : Popen, optional
+        The one that was started for it.
+    """
+
     node: Any
     replaces: str | None
     attach: bool
     command: Sequence[str] | None
     name: str | None
     within_s: float | None
-    adoption: Adoption | None = None
+    adoption: Adoption | None = field(default=None, repr=False)
     process: subprocess.Popen[bytes] | None = None
-    done: Any = field(default=None)
+    done: Any = field(default=None, repr=False)
+    #: Whether it was told that it has given no answer.
+    told: bool = field(default=False, repr=False)
 
     @property
     def elsewhere(self) -> bool:
@@ -50,7 +62,7 @@ class NodesUnderTest:
     """What a test has added to its corridor."""
 
     def __init__(self) -> None:
-        self._entries: list[_Entry] = []
+        self._entries: list[UnderTest] = []
 
     def add(
         self,
@@ -61,7 +73,7 @@ class NodesUnderTest:
         command: Sequence[str] | None,
         name: str | None,
         within_s: float | None,
-    ) -> None:
+    ) -> UnderTest:
         """Note a node; see `Corridor.add`."""
         if node is None and command is None and replaces is None and name is None:
             raise ValueError("a node, a command, or the name of what is replaced is needed")
@@ -75,7 +87,8 @@ class NodesUnderTest:
             raise ValueError(f"within_s must be above zero, not {within_s!r}")
         if replaces is not None and replaces in self.replaced:
             raise InputError("is replaced already", field="replaces", value=replaces)
-        self._entries.append(_Entry(node, replaces, attach, command, name, within_s))
+        self._entries.append(UnderTest(node, replaces, attach, command, name, within_s))
+        return self._entries[-1]
 
     @property
     def replaced(self) -> tuple[str, ...]:
@@ -97,7 +110,7 @@ class NodesUnderTest:
             if entry.replaces and entry.within_s is not None
         }
 
-    def enter(self, session: SteppedCorridor, domain: int) -> None:
+    def enter(self, session: SteppedCorridor, domain: int, past: Past) -> None:
         """Make the nodes, and connect them with a corridor that has not started."""
         session.patience = self.patience
         for entry in self._entries:
@@ -108,13 +121,16 @@ class NodesUnderTest:
                 )
             if entry.node is None:
                 continue
-            node = self._made(entry, session)
-            entry.node = node
-            session.add_node(node, entry.replaces)
-            if not isinstance(node, CorridorMixin):
-                self._adopt(entry, session)
+            entry.node = self._made(entry, session, past)
+            session.add_node(entry.node, entry.replaces)
+            if isinstance(entry.node, CorridorMixin):
+                continue
+            if entry.attach and entry.adoption is None:
+                self._adopt(entry, entry.node, session, past)
+            if entry.replaces:
+                self._answer_for(entry, entry.replaces, session)
 
-    def _made(self, entry: _Entry, session: SteppedCorridor) -> Any:
+    def _made(self, entry: UnderTest, session: SteppedCorridor, past: Past) -> Any:
         """The node itself, made if it is told how."""
         node = entry.node
         if not callable(node):
@@ -129,51 +145,76 @@ class NodesUnderTest:
                     parameters=session.spec(entry.replaces).parameters,
                     services=False,
                 )
+            elif entry.attach and isinstance(node, type) and issubclass(node, Node):
+                # Adopted before it begins, so that what it says at once is heard.
+                made = object.__new__(node)
+                self._adopt(entry, made, session, past)
+                begin: Callable[[], None] = made.__init__
+                begin()
             else:
                 made = node()
         if hasattr(made, "switch_on"):
             made.switch_on()
         return made
 
-    def _adopt(self, entry: _Entry, session: SteppedCorridor) -> None:
-        """Let an ordinary node have its messages in time, and say on its behalf what it cannot."""
-        if entry.attach:
-            entry.adoption = Adoption(entry.node, session.delivery, session.context.tap)
-        if entry.replaces:
-            session.announce_ready(entry.replaces)
-            if session.is_sink(entry.replaces) and entry.attach:
-                entry.done = session.observer.publisher(DONE, node=entry.replaces).send
-                session.when_tick_begins(lambda stamp_ns: self._answer(entry, session, stamp_ns))
+    @staticmethod
+    def _adopt(entry: UnderTest, node: Any, session: SteppedCorridor, past: Past) -> None:
+        """Let an ordinary node have its messages in time."""
+        entry.adoption = Adoption(node, session.delivery, session.context.tap, past)
+
+    def _answer_for(self, entry: UnderTest, name: str, session: SteppedCorridor) -> None:
+        """Say on behalf of an ordinary node what it does not know that it has to say."""
+        session.announce_ready(name)
+        if session.is_sink(name) and entry.attach:
+            entry.done = session.observer.publisher(DONE, node=name).send
+            session.when_tick_begins(lambda stamp_ns: self._answer(entry, session, stamp_ns))
 
     @staticmethod
-    def _answer(entry: _Entry, session: SteppedCorridor, stamp_ns: int) -> None:
+    def _answer(entry: UnderTest, session: SteppedCorridor, stamp_ns: int) -> None:
         """Say that a tick is done once everything of it has been handed over."""
         done = entry.done
         session.delivery.when_idle(lambda: session.call(lambda: done(header_to_cdr(stamp_ns))))
 
-    def after_tick(self, session: SteppedCorridor) -> None:
-        """Look what they have made meanwhile; raise what their callbacks have raised."""
+    def after_tick(self, session: SteppedCorridor, killed: Container[str]) -> None:
+        """Raise what their callbacks have raised, or that one gives no answer.
+
+        Parameters
+        ----------
+        session : SteppedCorridor
+        killed : container of str
+            Nodes that the test itself has ended.
+        """
+        failures = session.observer.failures
         for entry in self._entries:
             if entry.process is not None and entry.process.poll() is not None:
                 code = entry.process.returncode
                 raise NodeError(f"{' '.join(map(str, entry.command or ()))}: ended with {code}")
-            if entry.elsewhere:
-                continue
-            if entry.adoption is not None:
-                entry.adoption.look()
-                if entry.adoption.errors:
-                    error = entry.adoption.errors.pop(0)
-                    said = f"{type(error).__name__}: {error}"
-                    raise NodeError(self._line(entry, session, said)) from error
-            elif isinstance(entry.node, CorridorMixin):
+            for failed in failures:
+                if failed["node"] in (entry.replaces, entry.name):
+                    self._raise_failure(entry, failed, session, killed)
+            if entry.adoption is not None and entry.adoption.errors:
+                error = entry.adoption.errors.pop(0)
+                said = f"{type(error).__name__}: {error}"
+                raise NodeError(self._line(entry, session, said)) from error
+            if isinstance(entry.node, CorridorMixin):
                 health = entry.node.health_of(SOFTWARE)
                 if health is not None:
                     raise NodeError(self._line(entry, session, health.message))
 
+    def _raise_failure(
+        self, entry: UnderTest, failed: Any, session: SteppedCorridor, killed: Container[str]
+    ) -> None:
+        """Equipment that is given up is no result, unless it may be late or was ended."""
+        if entry.told or entry.within_s is not None or failed["node"] in killed:
+            return
+        entry.told = True
+        raise NodeError(self._line(entry, session, failed["reason"]))
+
     @staticmethod
-    def _line(entry: _Entry, session: SteppedCorridor, said: str) -> str:
-        name = entry.replaces or entry.node.get_fully_qualified_name()
-        return f"{name} at tick {session.ticks - 1}: {said}"
+    def _line(entry: UnderTest, session: SteppedCorridor, said: str) -> str:
+        name = entry.replaces or entry.name or entry.node.get_fully_qualified_name()
+        when = f"at tick {session.ticks - 1}" if session.ticks else "before the first tick"
+        return f"{name} {when}: {said}"
 
     def close(self) -> None:
         """End the processes that were started."""

@@ -95,6 +95,8 @@ class Histories:
                 kind, name, self._node.guarded(history.take), qos, raw=True
             )
 
+        for message in self._corridor.delivery.line(name).early:
+            history.take(message)
         self._corridor.delivery.read(name, reader, subscribe)
         self._histories[name] = history
 

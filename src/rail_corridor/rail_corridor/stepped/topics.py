@@ -142,19 +142,20 @@ class TopicHistory:
     def __init__(self, name: str, topic: Topic | None, kind: Any, tick: Callable[[], int]) -> None:
         self.name = name
         self._topic, self._kind, self._tick = topic, kind, tick
-        self._messages: list[Any] = []
+        #: As they were sent: serialised, or as views.
+        self.sent: list[Any] = []
         #: Tick in which each message came.
         self.ticks: list[int] = []
 
     def take(self, message: Any) -> None:
         """Keep a message, as it was sent."""
-        self._messages.append(message)
+        self.sent.append(message)
         self.ticks.append(self._tick())
 
     @property
     def count(self) -> int:
         """Number of messages so far."""
-        return len(self._messages)
+        return len(self.sent)
 
     @property
     def latest(self) -> Any:
@@ -165,9 +166,9 @@ class TopicHistory:
         LookupError
             If there is none yet.
         """
-        if not self._messages:
+        if not self.sent:
             raise LookupError(f"{self.name}: nothing has been sent on it yet")
-        return view_of(self._topic, self._kind, self._messages[-1])
+        return view_of(self._topic, self._kind, self.sent[-1])
 
     @property
     def all(self) -> list[Any]:
@@ -175,11 +176,11 @@ class TopicHistory:
         return list(self)
 
     def __iter__(self) -> Iterator[Any]:
-        return (view_of(self._topic, self._kind, message) for message in self._messages)
+        return (view_of(self._topic, self._kind, message) for message in self.sent)
 
     def __len__(self) -> int:
-        return len(self._messages)
+        return len(self.sent)
 
     def __repr__(self) -> str:
-        last = f", last {self.latest!r}" if self._messages else ""
-        return f"<{self.name}: {len(self._messages)} messages{last}>"
+        last = f", last {self.latest!r}" if self.sent else ""
+        return f"<{self.name}: {len(self.sent)} messages{last}>"

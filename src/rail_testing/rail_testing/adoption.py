@@ -20,6 +20,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rail_corridor.equipment.registry import kind_of
 from rail_msgs_py.delivery import Line, LocalDelivery, LocalReader, Sendable, serialised
 
+#: What rclpy says by itself, in wall time: no message of the corridor.
+_OF_ROS = ("/parameter_events", "/rosout")
 #: What has been sent on a topic so far, by its name.
 Past = Callable[[str], Sequence[Sendable]]
 
@@ -134,6 +136,8 @@ class Adoption:
 
     def _take_publisher(self, publisher: Any) -> None:
         name = publisher.topic_name
+        if name in _OF_ROS:
+            return
         line, delivery, topic = self._delivery.line(name), self._delivery, kind_of(name)
         line.writers.append(self.node)
         line.kind = publisher.msg_type

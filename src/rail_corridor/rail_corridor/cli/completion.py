@@ -47,7 +47,7 @@ def complete_trace(incomplete: str) -> list[str]:
     topic, dot, _ = incomplete.partition(".")
     if not dot:
         return complete_topic(incomplete)
-    from rail_corridor.equipment.registry import kind_of
+    from .topic_kinds import kind_of
 
     kind = kind_of(topic)
     names = [f"{topic}.{column}" for column in (kind.columns if kind is not None else ())]

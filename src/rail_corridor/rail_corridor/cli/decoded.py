@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from rail_corridor.equipment.registry import kind_of
 from rail_msgs_py.table import Table
 from rail_msgs_py.waveform import Waveform
+
+from .topic_kinds import kind_of
 
 _LEVELS = {b"\x00": "ok", b"\x01": "warn", b"\x02": "error", b"\x03": "stale"}
 _SAMPLES_SHOWN = 4

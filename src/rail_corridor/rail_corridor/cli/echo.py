@@ -9,11 +9,10 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from rail_corridor.equipment.registry import kind_of
-
 from .decoded import decode, raw_text, values_line
 from .fields import ROW, STAMP, Record, RecordReader, Records
 from .selection import Selection
+from .topic_kinds import kind_of
 
 
 class Echo:

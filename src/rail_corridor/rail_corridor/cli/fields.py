@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rail_corridor.equipment.registry import kind_of
 from rail_msgs_py.stamps import to_ns
 from rail_msgs_py.table import Table
 
+from .topic_kinds import kind_of
 from .usage import UsageError
 
 STAMP, ROW = "stamp_s", "row"

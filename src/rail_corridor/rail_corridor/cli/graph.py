@@ -136,8 +136,9 @@ def message_class_of(graph: Graph, topic: str) -> Any:
 
 def like_publisher(node: Node, topic: str) -> QoSProfile:
     """Profile that every publisher of a topic is compatible with, latched if it is."""
-    from rail_corridor.equipment.registry import kind_of
     from rail_msgs_py.topics.qos import LATCHED
+
+    from .topic_kinds import kind_of
 
     offers = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
     kind = kind_of(topic)

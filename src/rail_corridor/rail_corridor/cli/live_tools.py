@@ -24,8 +24,9 @@ def list_topics() -> int:
     """Show the topics of the running corridor; returns the exit code."""
     with graph_of("rail_topics") as graph:
         # Loaded while discovery goes on, which takes about as long.
-        from rail_corridor.equipment.registry import kind_of
         from rail_msgs_py.topics import tick
+
+        from .topic_kinds import kind_of
 
         graph.wait()
         topics = sorted(graph.topics().items())

@@ -69,9 +69,12 @@ class Recorder:
         return "/node"
 
     def wait(self, seconds: float) -> None:
-        self.now_s += seconds
-        for timer in self._timers:
-            timer()
+        """Let time pass, with a look ten times a second."""
+        end_s = self.now_s + seconds
+        while self.now_s < end_s:
+            self.now_s = min(self.now_s + 0.1, end_s)
+            for timer in self._timers:
+                timer()
 
     def step(self, stamp_ns: int, items: dict[str, Any]) -> None:
         self.ticks.append((stamp_ns, items))
@@ -128,6 +131,18 @@ def test_a_delayed_port_gives_what_was_sent_a_tick_before(node: Recorder) -> Non
         [None, None],
         [[1.0, 0.0], [1.0, 0.0]],
     ]
+
+
+def test_nobody_was_late_while_this_process_was_held_up(node: Recorder) -> None:
+    ports = open_circuits(node, TickInputs(node, node.step, TIMEOUT_S))
+    node.feed[ports["tc1"]](occupancy("tc1", 0))
+    node.feed["/clock"](clock(0))
+    node.wait(1.0)
+    node.now_s += 100.0  # a debugger
+    node.wait(TIMEOUT_S - 1.3)
+    assert node.failed == []
+    node.wait(0.6)
+    assert [name for name, _ in node.failed] == ["/wayside/tc2/track_code"]
 
 
 def test_the_owner_of_an_overdue_port_is_named_and_its_item_missing(node: Recorder) -> None:

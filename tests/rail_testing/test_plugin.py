@@ -68,7 +68,7 @@ def test_a_suite_of_a_tester(pytester: pytest.Pytester) -> None:
     assert "tick 7 (0.70 s): does not hold: lambda: c.time_s < 0.6" not in said
     assert "tick 6 (0.60 s): does not hold: lambda: c.time_s < 0.6" in said
     assert "plain_line, seed 5, tick 6 (0.60 s)" in said
-    assert re.search(r"again: pytest '.*::test_fails'", said)
+    assert re.search(r"again: \S+ -m pytest '.*::test_fails'", said)
     found = re.search(r"recording: (\S*test_fails\S*\.mcap)", said)
     assert found is not None
     with Path(found[1]).open("rb") as stream:

@@ -9,8 +9,9 @@ Messages handed over are shared: neither the sender nor a reader may change one.
 
 from __future__ import annotations
 
+import math
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -106,8 +107,9 @@ class Line:
     kind: Any = None
     #: What becomes of each message before anybody is told of it; as it is, if there is none.
     intercept: Callable[[Sendable], Iterable[Sendable]] | None = None
-    #: On a bench: what was sent before all nodes were made, for those who read later.
+    #: On a bench: what was sent before somebody kept it, and whether that is wanted.
     early: list[Sendable] = field(default_factory=list)
+    gathers: bool = True
     #: Subscriptions to the outside that nobody has needed yet, and whose they would be.
     subscriptions: list[tuple[Any, Callable[[], None]]] = field(default_factory=list)
 
@@ -172,6 +174,8 @@ class LocalDelivery:
     def __init__(self) -> None:
         #: Whether messages may be intercepted on their lines; known before publishers are made.
         self.intercepts = False
+        #: Steady wall time after which long work is not gone on with.
+        self.until_s = math.inf
         self._ears: dict[str, Ear] = {}
         self._lines: dict[str, Line] = {}
         self._queue: deque[tuple[Callable[[Any], None], Any, LocalReader]] = deque()
@@ -309,4 +313,13 @@ class LocalDelivery:
 
     def _go_on(self) -> None:
         self._to_go_on = False
-        self.run()
+        if time.monotonic() < self.until_s:
+            self.run()
+
+    def going_round(self) -> str:
+        """What still waits, in words; nothing if nothing does."""
+        lines = {id(r): name for name, line in self._lines.items() for r in line.readers}
+        waiting = Counter(lines.get(id(reader), "?") for _, _, reader in self._queue)
+        return "".join(
+            f": {count} messages wait on {name}" for name, count in waiting.most_common(1)
+        )

@@ -80,6 +80,33 @@ class FailureWatch:
             self._publisher.publish(failure(node, reason, by, stamp_ns))
 
 
+class HeldUp:
+    """Tells for how long this process could not look: then nobody else was late.
+
+    A debugger, or equipment under test that computes for long, holds up every node of its process.
+
+    Parameters
+    ----------
+    period_s : float
+        Wall time between two looks.
+
+    Examples
+    --------
+    >>> held_up = HeldUp(0.1)
+    >>> [round(held_up.look(now_s), 3) for now_s in (5.0, 5.1, 5.25, 8.25)]
+    [0.0, 0.0, 0.0, 2.8]
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s, self._looked_s = period_s, float("nan")
+
+    def look(self, now_s: float) -> float:
+        """Wall time since the look before in which there was none, though two were due [s]."""
+        late_s = now_s - self._looked_s - 2.0 * self._period_s
+        self._looked_s = now_s
+        return max(0.0, late_s) if late_s == late_s else 0.0
+
+
 class TickWatch(FailureWatch):
     """Gives up the ports that one inbox waits for too long in a tick.
 
@@ -108,6 +135,7 @@ class TickWatch(FailureWatch):
         super().__init__(node, owners, self._drop)
         self._inbox, self._timeout_s, self._advance = inbox, timeout_s, advance
         self._begun_s = float("inf")
+        self._held_up = HeldUp(WATCH_PERIOD_S)
         node.look_every(WATCH_PERIOD_S, self._check)
 
     def begin(self) -> None:
@@ -119,7 +147,9 @@ class TickWatch(FailureWatch):
         self._begun_s = float("inf")
 
     def _check(self) -> None:
-        if self._node.steady_s() - self._begun_s > self._timeout_s:
+        now_s = self._node.steady_s()
+        self._begun_s += self._held_up.look(now_s)
+        if now_s - self._begun_s > self._timeout_s:
             overdue = [port for port in self._inbox.missing if port in self._owners]
             self.give_up(overdue, self._timeout_s, self._inbox.latest_ns)
 

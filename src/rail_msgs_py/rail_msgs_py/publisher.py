@@ -76,7 +76,7 @@ class CorridorPublisher:
 
         def send(message: Sendable) -> None:
             for each in (message,) if line.intercept is None else line.intercept(message):
-                if not delivery.settled:
+                if line.gathers:
                     line.early.append(each)
                 send_on(each)
 

@@ -9,13 +9,13 @@ it.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Any
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy
 from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.subscription import Subscription
 
 from rail_corridor.equipment.registry import kind_of
 from rail_msgs_py.delivery import Line, LocalDelivery, LocalReader, Sendable, serialised
@@ -49,6 +49,8 @@ class Adoption:
         self._known: set[int] = set()
         #: What its callbacks have raised, in their order.
         self.errors: list[Exception] = []
+        #: Messages that it has sent.
+        self.sent = 0
         self._readers: dict[int, tuple[Line, LocalReader]] = {}
         self._destroy = node.destroy_subscription
         node.destroy_subscription = self._destroy_subscription
@@ -89,7 +91,8 @@ class Adoption:
         if kept and not line.writers:
             return  # what was said before is kept by the middleware of another process
         outside: Callable[..., None] = subscription.callback
-        with_info = _positional(outside) > 1
+        # As rclpy has found out: a second argument that has a default is none.
+        with_info = subscription._callback_type is Subscription.CallbackType.WithMessageInfo
 
         def take(sent: Sendable) -> None:
             raw = serialised(sent)
@@ -145,7 +148,7 @@ class Adoption:
         publish_outside, keeps = publisher.publish, _keeps(publisher.qos_profile)
 
         def send_on(raw: bytes) -> None:
-            if not delivery.settled:
+            if line.gathers:
                 line.early.append(raw)
             if sink is not None:
                 sink(raw)
@@ -156,6 +159,7 @@ class Adoption:
 
         def publish(message: Any) -> None:
             raw = message if isinstance(message, bytes) else bytes(serialize_message(message))
+            self.sent += 1
             for each in (raw,) if line.intercept is None else line.intercept(raw):
                 send_on(serialised(each))
             delivery.run()
@@ -199,11 +203,3 @@ def _depth(profile: Any) -> int:
     if profile.history == HistoryPolicy.KEEP_ALL:
         return 1 << 30
     return int(profile.depth) or 1
-
-
-def _positional(callback: Callable[..., None]) -> int:
-    """How many arguments a callback takes: the second is what rclpy knows of the message."""
-    try:
-        return len(inspect.signature(callback).parameters)
-    except (TypeError, ValueError):
-        return 1

@@ -11,7 +11,6 @@ Units are seconds and metres. Times are simulated ones, unless they are called w
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -21,7 +20,7 @@ from rail_corridor.errors import InputError
 from rail_corridor.loading.overrides import Overrides
 from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.middleware.domain import free_domain
-from rail_corridor.plan.plan import Placement, Plan, make_plan
+from rail_corridor.plan.plan import Placement, Plan
 from rail_corridor.report.verdict import Verdict, verdict_of
 from rail_corridor.scenario.model import Scenario
 from rail_corridor.stepped.corridor import SteppedCorridor
@@ -30,20 +29,21 @@ from rail_corridor.stepped.interference import Interference
 from rail_corridor.stepped.topics import NotKnownError, TopicHistory
 from rail_corridor.stepped.truth import Truth
 
+from .adding import AddingMixin
 from .checked import checked_condition, checked_placement, checked_ticks, ticks_in
 from .conditions import Always, Watched, said_of
 from .evidence import Evidence, said_of_health
 from .interfering import InterferingMixin
 from .outcome import Outcome
 from .scenario_source import scenario_of
-from .under_test import NodesUnderTest, UnderTest
+from .under_test import NodesUnderTest
 
 #: Wall time without an answer after which a node counts as failed, as with ``rail run``: a machine
 #: that is busy with other tests must not make one fail.
 TIMEOUT_S = 30.0
 
 
-class Corridor(InterferingMixin):
+class Corridor(AddingMixin, InterferingMixin):
     """A scenario that runs when it is told to.
 
     Nothing has been started until a call needs it, so that nodes and faults can be added first.
@@ -67,6 +67,9 @@ class Corridor(InterferingMixin):
     recording : Path, optional
         MCAP file for everything but waveforms, written when the test fails, or `keep_recording`
         says so.
+    switches : bool
+        Whether equipment of this process offers the services of its life cycle, for nodes under
+        test that switch it; `switch_off` does without.
 
     Raises
     ------
@@ -84,8 +87,10 @@ class Corridor(InterferingMixin):
         timeout_s: float = TIMEOUT_S,
         domain: int | None = None,
         recording: Path | None = None,
+        switches: bool = False,
     ) -> None:
         super().__init__()
+        self._switches = switches
         self._scenario = scenario_of(scenario, Overrides(seed=seed, duration_s=duration_s))
         self.placement = checked_placement(placement)
         self._timeout_s, self._domain = timeout_s, domain
@@ -97,14 +102,15 @@ class Corridor(InterferingMixin):
         self._always: list[Always] = []
         self._interference: Interference | None = None
         self._evidence = Evidence(recording)
-        self._watched: list[str] = []
         self._closed = False
 
     def __enter__(self) -> Corridor:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
         self.close()
+        if kind is None:
+            self.conclude()
 
     # Before the first tick ---------------------------------------------------------------
 
@@ -117,60 +123,6 @@ class Corridor(InterferingMixin):
     def scenario(self) -> Scenario:
         """The scenario, with the faults that were injected."""
         return self._scenario
-
-    def parameters_of(self, node: str) -> dict[str, Any]:
-        """ROS parameters that the scenario gives a node, by its full name."""
-        return dict(self._planned().node(node).parameters)
-
-    def add(
-        self,
-        node: Any = None,
-        *,
-        replaces: str | None = None,
-        attach: bool = True,
-        command: Sequence[str] | None = None,
-        name: str | None = None,
-        within_s: float | None = None,
-    ) -> UnderTest:
-        """Put a node beside the corridor, or in the place of one of its own.
-
-        Before the first tick. Of a kind derived from `rail_msgs_py.tick_node` the scenario's name
-        and parameters are handed over.
-
-        Parameters
-        ----------
-        node : rclpy Node, class, or callable that makes one; optional
-            None if ``command`` starts it, or if it runs elsewhere already.
-        replaces : str, optional
-            Full name of a node of the scenario, whose work it does.
-        attach : bool
-            Whether no tick begins before its callbacks of the one before have run.
-        command : sequence of str, optional
-            Starts it in a process of its own, in any language, with the corridor's ROS domain.
-        name : str, optional
-            Full name of a node in a process of its own that replaces nothing: each tick waits for
-            its answer on ``<name>/done``.
-        within_s : float, optional
-            Wall time that a tick waits for a node that replaces one; then the corridor goes on
-            without it until it sends again. The time-out of the corridor if not given.
-
-        Returns
-        -------
-        UnderTest
-            Its ``node`` is the node itself, once the corridor has started.
-
-        Raises
-        ------
-        InputError
-            If the corridor has no such node, or has begun.
-        """
-        if self._session is not None:
-            raise InputError("add nodes before the first tick", field="node", value=str(node))
-        if replaces is not None:
-            self.parameters_of(replaces)
-        return self._under_test.add(
-            node, replaces, attach=attach, command=command, name=name, within_s=within_s
-        )
 
     # Time --------------------------------------------------------------------------------
 
@@ -259,6 +211,8 @@ class Corridor(InterferingMixin):
         It is not decided in a tick in which it compares a value that is not known; at the end of
         the run it must have been decided at least once.
         """
+        if self._session is not None:
+            self._unfinished("always")
         self._always.append(Always(checked_condition(condition)))
 
     def run_to_end(self) -> Outcome:
@@ -266,9 +220,14 @@ class Corridor(InterferingMixin):
         __tracebackhide__ = True
         while self.step():
             pass
+        self.conclude()
+        return self.outcome()
+
+    def conclude(self) -> None:
+        """Raise AssertionError if a condition of `always` was never decided."""
+        __tracebackhide__ = True
         for condition in self._always:
             condition.conclude()
-        return self.outcome()
 
     # What is said and true ---------------------------------------------------------------
 
@@ -279,7 +238,6 @@ class Corridor(InterferingMixin):
         """
         self._running()
         assert self._histories is not None
-        self._watched.append(name)
         return self._histories[name]
 
     @property
@@ -340,14 +298,6 @@ class Corridor(InterferingMixin):
             self._evidence.close()
             self._held.close()
 
-    def _planned(self) -> Plan:
-        if self._session is not None:
-            return self._session.plan
-        if self._plan is None:
-            with tempfile.TemporaryDirectory() as directory:
-                self._plan = make_plan(self._scenario, Path(directory))
-        return self._plan
-
     def _running(self) -> SteppedCorridor:
         if self._closed:
             raise RuntimeError("the corridor is closed")
@@ -367,6 +317,7 @@ class Corridor(InterferingMixin):
             external=self._under_test.replaced,
             attached=self._under_test.awaited,
             tap=self._evidence.tap,
+            switches=self._switches,
         )
         try:
             self._interference = Interference(self._session)
@@ -388,13 +339,14 @@ class Corridor(InterferingMixin):
 
     def _watch(self, condition: Callable[[], Any]) -> tuple[bool | None, Watched]:
         """What a condition says, None if it is not decided, and what it has looked at."""
-        self._watched.clear()
+        assert self._histories is not None
+        self._histories.looked_at.clear()
         try:
             value = bool(condition())
         except NotKnownError:
             value = None
-        assert self._histories is not None
-        return value, Watched({name: self._histories[name] for name in self._watched})
+        seen = list(self._histories.looked_at)
+        return value, Watched({name: self._histories[name] for name in seen})
 
     def _where(self) -> str:
         return f"tick {self.ticks - 1} ({self.time_s:.2f} s)" if self.ticks else "before tick 0"

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from rail_corridor.equipment.registry import kind_of
-from rail_corridor.errors import InputError
+from rail_corridor.errors import InputError, did_you_mean
 from rail_corridor.loading.loader import scenario_from_data
+from rail_corridor.loading.schema import fault_fields, fault_kinds
 from rail_corridor.plan.plan import Plan
 from rail_corridor.scenario.model import Scenario
 from rail_corridor.stepped.corridor import SteppedCorridor
@@ -17,6 +18,7 @@ from rail_msgs_py.publisher import CorridorPublisher
 
 from .interception import Interception, Interceptor, InterceptorError
 from .scenario_source import times_of
+from .under_test import NodesUnderTest
 
 
 class InterferingMixin:
@@ -26,6 +28,7 @@ class InterferingMixin:
     _plan: Plan | None
     _session: SteppedCorridor | None
     _interference: Interference | None
+    _under_test: NodesUnderTest
 
     def __init__(self) -> None:
         self._interceptions: dict[str, Interception] = {}
@@ -48,8 +51,15 @@ class InterferingMixin:
                 said = f"{type(error).__name__}: {error}"
                 raise InterceptorError(f"interceptor of {topic}: {said}") from error
 
+    def _unfinished(self, what: str) -> SteppedCorridor:
+        """The run, which has to go on for what is done to it to matter."""
+        session = self._running()
+        if session.finished:
+            raise InputError("the run has come to its end", field="call", value=what)
+        return session
+
     def _interfere(self) -> Interference:
-        self._running()
+        self._unfinished("interfere")
         assert self._interference is not None
         return self._interference
 
@@ -61,7 +71,7 @@ class InterferingMixin:
         InputError
             If it is none of the topic.
         """
-        session = self._running()
+        session = self._unfinished("publish")
         known = kind_of(topic)
         kinds = () if known is None else (known.type, known.view, bytes)
         if known is not None and not isinstance(message, tuple(filter(None, kinds))):
@@ -91,8 +101,13 @@ class InterferingMixin:
         if not isinstance(given, Mapping):
             reason = "must be a mapping with kind, as in the list of a scenario"
             raise InputError(reason, field="faults", value=given)
+        if self._session is not None:
+            self._unfinished("inject")
         data = self._scenario.model_dump(mode="json", exclude_unset=True)
         kind = str(fault.get("kind", ""))
+        if not fault_fields(kind):
+            reason = f"is no kind of fault{did_you_mean(kind, fault_kinds())}"
+            raise InputError(reason, field="kind", value=kind)
         complete = {**times_of(kind, self._next_s), **fault}
         data["faults"] = [*data.get("faults", ()), complete]
         changed = scenario_from_data(data, directory=Path.cwd())
@@ -114,9 +129,16 @@ class InterferingMixin:
         self._killed.add(node)
 
     def restart(self, node: str) -> None:
-        """Start a node anew, whether or not it is alive."""
+        """Start a node anew, whether or not it is alive: one under test from what made it.
+
+        Raises
+        ------
+        InputError
+            If a node under test was handed over ready made, or is in another process.
+        """
         self._killed.add(node)
-        self._interfere().restart(node)
+        make = self._under_test.maker_of(node, self._running())
+        self._interfere().restart(node, make)
 
     def intercept(self, topic: str, function: Interceptor | None) -> Interception | None:
         """Let a function have every message of a topic before anybody else.
@@ -129,12 +151,17 @@ class InterferingMixin:
             several, none (None), or `Late` ones. Without it everything passes again.
         """
         session = self._running()
+        line = session.delivery.line(topic)
+        if not line.writers and self._kind(topic) is not None:
+            reason = (
+                "is sent in another process: messages are intercepted where all nodes are in one"
+            )
+            raise InputError(reason, field="topic", value=topic)
         before = self._interceptions.pop(topic, None)
         if before is not None:
             before.remove()
         if function is None:
             return None
-        line = session.delivery.line(topic)
         made = Interception(line, self._kind(topic), function)
         self._interceptions[topic] = made
         return made

@@ -13,6 +13,7 @@ and fails if the two runs differ, naming the first difference.
 from __future__ import annotations
 
 import itertools
+import sys
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -119,6 +120,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]
     """Run a test that is marked so a second time, and compare."""
     answer = yield
     factory = _factory_of(pyfuncitem)
+    for each in [] if factory is None else factory.made:
+        each.conclude()
     if factory is None or not _asked_of(pyfuncitem).get("repeat"):
         return answer
     from .repeatability import first_difference
@@ -166,5 +169,5 @@ def _said(corridor: Corridor, item: pytest.Item) -> str:
             lines.append(f"recording: {kept}")
     # Where tests are divided among workers, the name ends with the group of the test.
     name = item.nodeid.rpartition("@")[0] if item.get_closest_marker("xdist_group") else ""
-    lines.append(f"again: pytest '{name or item.nodeid}'")
+    lines.append(f"again: {sys.executable} -m pytest '{name or item.nodeid}'")
     return "\n".join(lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
@@ -85,6 +86,11 @@ def _values(view: Any) -> dict[str, Any]:
 
 
 def _same(one: Any, other: Any) -> bool:
+    """Whether two values are the same, what is not known being the same as itself."""
+    if hasattr(one, "get_fields_and_field_types") and type(one) is type(other):
+        return all(_same(getattr(one, n), getattr(other, n)) for n in _values(one))
+    if isinstance(one, array | list | tuple) and isinstance(other, array | list | tuple):
+        return len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         return np.array_equal(one, other, equal_nan=True)
     both_nan = isinstance(one, float) and isinstance(other, float) and one != one and other != other

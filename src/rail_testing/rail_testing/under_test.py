@@ -18,6 +18,7 @@ from rail_corridor.stepped.corridor import SteppedCorridor
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.node import SOFTWARE, CorridorMixin
 from rail_msgs_py.topics.tick import DONE
+from rail_world.errors import shorten
 
 from .adoption import Adoption, Past
 
@@ -49,6 +50,8 @@ class UnderTest:
     adoption: Adoption | None = field(default=None, repr=False)
     process: subprocess.Popen[bytes] | None = None
     done: Any = field(default=None, repr=False)
+    made_by: Any = field(default=None, repr=False)
+    sent: int = field(default=0, repr=False)
     #: Whether it was told that it has given no answer.
     told: bool = field(default=False, repr=False)
 
@@ -63,6 +66,7 @@ class NodesUnderTest:
 
     def __init__(self) -> None:
         self._entries: list[UnderTest] = []
+        self._past: Past = lambda _: ()
 
     def add(
         self,
@@ -112,23 +116,48 @@ class NodesUnderTest:
 
     def enter(self, session: SteppedCorridor, domain: int, past: Past) -> None:
         """Make the nodes, and connect them with a corridor that has not started."""
-        session.patience = self.patience
+        session.patience, self._past = self.patience, past
         for entry in self._entries:
             if entry.command is not None:
                 environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
-                entry.process = subprocess.Popen(
-                    list(entry.command), env=environment, start_new_session=True
-                )
-            if entry.node is None:
+                try:
+                    entry.process = subprocess.Popen(
+                        list(entry.command), env=environment, start_new_session=True
+                    )
+                except OSError as error:
+                    reason = f"cannot be started: {error.strerror}"
+                    raise InputError(reason, field="command", value=entry.command[0]) from None
+            if entry.node is not None:
+                entry.made_by = entry.node if callable(entry.node) else None
+                self._bring_in(entry, session, past)
+
+    def _bring_in(self, entry: UnderTest, session: SteppedCorridor, past: Past) -> None:
+        """Make a node, if it is told how, and let it take part."""
+        again = entry.done is not None
+        entry.node = self._made(entry, session, past)
+        session.add_node(entry.node, entry.replaces)
+        if isinstance(entry.node, CorridorMixin):
+            return
+        if entry.attach and entry.adoption is None:
+            self._adopt(entry, entry.node, session, past)
+        if entry.replaces and not again:
+            self._answer_for(entry, entry.replaces, session)
+
+    def maker_of(self, name: str, session: SteppedCorridor) -> Callable[[], None] | None:
+        """What makes a node of the test anew; None for one of the scenario's own."""
+        for entry in self._entries:
+            if name != (entry.replaces or entry.name):
                 continue
-            entry.node = self._made(entry, session, past)
-            session.add_node(entry.node, entry.replaces)
-            if isinstance(entry.node, CorridorMixin):
-                continue
-            if entry.attach and entry.adoption is None:
-                self._adopt(entry, entry.node, session, past)
-            if entry.replaces:
-                self._answer_for(entry, entry.replaces, session)
+            if entry.made_by is None:
+                reason = "was not made here: give its class, or what makes it, to have it restarted"
+                raise InputError(reason, field="node", value=name)
+
+            def make(entry: UnderTest = entry) -> None:
+                entry.node, entry.adoption = entry.made_by, None
+                self._bring_in(entry, session, self._past)
+
+            return make
+        return None
 
     def _made(self, entry: UnderTest, session: SteppedCorridor, past: Past) -> Any:
         """The node itself, made if it is told how."""
@@ -187,8 +216,9 @@ class NodesUnderTest:
         failures = session.observer.failures
         for entry in self._entries:
             if entry.process is not None and entry.process.poll() is not None:
-                code = entry.process.returncode
-                raise NodeError(f"{' '.join(map(str, entry.command or ()))}: ended with {code}")
+                words = shorten(" ".join(map(str, entry.command or ())))
+                said = f"ended with {entry.process.returncode}: {words}"
+                raise NodeError(self._line(entry, session, said))
             for failed in failures:
                 if failed["node"] in (entry.replaces, entry.name):
                     self._raise_failure(entry, failed, session, killed)
@@ -196,10 +226,22 @@ class NodesUnderTest:
                 error = entry.adoption.errors.pop(0)
                 said = f"{type(error).__name__}: {error}"
                 raise NodeError(self._line(entry, session, said)) from error
+            self._see_that_it_answers(entry, session, killed)
             if isinstance(entry.node, CorridorMixin):
                 health = entry.node.health_of(SOFTWARE)
                 if health is not None:
                     raise NodeError(self._line(entry, session, health.message))
+
+    def _see_that_it_answers(
+        self, entry: UnderTest, session: SteppedCorridor, killed: Container[str]
+    ) -> None:
+        """An ordinary node that the bench answers for must have sent something in the tick."""
+        if entry.adoption is None or entry.replaces is None or not session.ticks:
+            return
+        before, entry.sent = entry.sent, entry.adoption.sent
+        if entry.sent == before and entry.within_s is None and entry.replaces not in killed:
+            said = "has sent nothing in this tick: every tick needs a message on each output"
+            raise NodeError(self._line(entry, session, said))
 
     def _raise_failure(
         self, entry: UnderTest, failed: Any, session: SteppedCorridor, killed: Container[str]
@@ -212,7 +254,9 @@ class NodesUnderTest:
 
     @staticmethod
     def _line(entry: UnderTest, session: SteppedCorridor, said: str) -> str:
-        name = entry.replaces or entry.name or entry.node.get_fully_qualified_name()
+        name = entry.replaces or entry.name or "the command"
+        if entry.node is not None and not entry.replaces:
+            name = entry.node.get_fully_qualified_name()
         when = f"at tick {session.ticks - 1}" if session.ticks else "before the first tick"
         return f"{name} {when}: {said}"
 

@@ -18,7 +18,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Header, String
 
-from rail_msgs_py.failures import WATCH_PERIOD_S, FailureWatch
+from rail_msgs_py.failures import WATCH_PERIOD_S, FailureWatch, HeldUp
 from rail_msgs_py.inbox import TickInbox
 from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
@@ -151,6 +151,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self.publisher(CORRIDOR_MARKERS).publish(markers(described.drawing, network))
         self.publisher(SCENARIO).publish(String(data=described.scenario))
         self._pace: Any = None
+        self._held_up = HeldUp(WATCH_PERIOD_S)
         self._watch_timer = self.every(WATCH_PERIOD_S, self._check)
         self.await_connection(
             lambda: self._clock_publisher.get_subscription_count() >= self._p.clock_readers,
@@ -269,11 +270,10 @@ class WorldNode(TickNode[WorldParameters], name="world"):
 
     def _stopped(self, tick: int) -> dict[str, DriveCommand]:
         """Commands to trains that stop of themselves during a tick."""
-        time_s = tick * self._tick_ns * 1e-9
         return {
             stop.train: DriveCommand(emergency_brake=True)
             for stop in self._stops
-            if stop.from_s <= time_s < stop.to_s
+            if stop.from_s <= tick * self._tick_ns * 1e-9 < stop.to_s
         }
 
     def _publish_odometers(self, stamp_ns: int) -> None:
@@ -295,8 +295,9 @@ class WorldNode(TickNode[WorldParameters], name="world"):
             publish(self._truth_writers[key].write(position))
 
     def _on_done(self, sink: str, raw: bytes) -> None:
-        self._inbox.put(clock_from_cdr(raw), sink, None)
-        self._advance()
+        if (stamp_ns := clock_from_cdr(raw)) <= self._tick * self._tick_ns:  # has it begun?
+            self._inbox.put(stamp_ns, sink, None)
+            self._advance()
 
     def _on_command(self, port: str, raw: bytes) -> None:
         stamp_ns, values = values_from_cdr(raw, 1, len(COMMAND.columns))
@@ -366,6 +367,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
 
     def _check(self) -> None:
         now_s = self.steady_s()
+        self._begun_s += self._held_up.look(now_s)
         if self._tick < 0:
             if not self.steps.standing:
                 self._wait_for_the_start(now_s)

@@ -60,6 +60,12 @@ def fault_fields(kind: str) -> frozenset[str]:
     return frozenset()
 
 
+def fault_kinds() -> list[str]:
+    """Every kind of fault that a scenario may hold."""
+    kinds = (get_args(fault.model_fields["kind"].annotation) for fault in _kinds_of_faults())
+    return [kind for some in kinds for kind in some]
+
+
 def field_names() -> set[str]:
     """Name of every field that a scenario may hold, for suggestions."""
     return {name for model in models_of(scenario_model()) for name in model.model_fields}

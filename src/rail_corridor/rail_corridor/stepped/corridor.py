@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import math
 import shutil
 import sys
 import tempfile
@@ -81,6 +82,8 @@ class SteppedCorridor:
     placement : 'one', 'site' or 'node'
         Where nodes are: all in this process, or the world and the report here and the others in
         processes of their own.
+    switches : bool
+        Whether equipment of this process offers the services of its life cycle.
 
     Raises
     ------
@@ -98,9 +101,10 @@ class SteppedCorridor:
         attached: tuple[str, ...] = (),
         tap: Tap | None = None,
         placement: Placement = "one",
+        switches: bool = False,
     ) -> None:
         self.scenario = scenario
-        self._external = tuple(external)
+        self._external, self._switches = tuple(external), switches
         self._directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
         #: Wall time without an answer after which the world gives a node up [s].
         self.timeout_s = timeout_s
@@ -146,12 +150,12 @@ class SteppedCorridor:
             alone=not (self._external or elsewhere),
         )
         for spec in (spec for name in here for spec in groups[name]):
-            self.nodes[spec.name] = make_node(spec, self.context, False)
+            self.nodes[spec.name] = self.made(spec)
         self.world = self.nodes[WORLD]
         self._hear_failures()
         for node in (self.observer, *self.nodes.values()):
             self.executor.add_node(node)
-        self._started = self._closed = False
+        self._started = self._closed = self._stepping = False
         #: Wall time that a tick waits for nodes that may be late, by their names [s].
         self.patience: dict[str, float] = {}
 
@@ -179,6 +183,10 @@ class SteppedCorridor:
         """Delivery of the messages of this process."""
         delivery: LocalDelivery = self.context.delivery
         return delivery
+
+    def made(self, spec: NodeSpec) -> Any:
+        """One of the scenario's own nodes, new."""
+        return make_node(spec, self.context, self._switches)
 
     def add_node(self, node: Any, name: str | None = None) -> None:
         """Spin one more node with the corridor."""
@@ -279,6 +287,8 @@ class SteppedCorridor:
         """Let the world run to a number of ticks, and all that comes of them be handed over."""
         if self.finished:
             return
+        if self._stepping:
+            raise RuntimeError("a tick is under way: it cannot be stepped from within")
         over, delivery = Future(), self.delivery
 
         def settle() -> None:
@@ -287,13 +297,20 @@ class SteppedCorridor:
         def go_on() -> None:
             self.world.steps.run_until(ticks, settle)
 
+        self._stepping, delivery.until_s = True, time.monotonic() + patience_s
+        try:
+            self._step_over(go_on, over, patience_s)
+        finally:
+            self._stepping, delivery.until_s = False, math.inf
+
+    def _step_over(self, go_on: Callable[[], None], over: Any, patience_s: float) -> None:
         self.call(go_on)
         for name, within_s in sorted(self.patience.items(), key=lambda item: item[1]):
             if self.spin_until(over, within_s):
                 break
             self.call(partial(self.observer.announce_failure, name, f"late by {within_s:g} s"))
         if not self.spin_until(over, patience_s) or not self._settled(patience_s):
-            lacking = self._lacking()
+            lacking = self.delivery.going_round() or self._lacking()
             raise StalledError(f"tick {self.ticks}: not over within {patience_s:g} s{lacking}")
 
     def _settled(self, within_s: float) -> bool:

@@ -36,6 +36,8 @@ class Histories:
         self._corridor = corridor
         self._node = corridor.observer
         self._histories: dict[str, TopicHistory] = {}
+        #: Topics that somebody has looked at, in that order; for who wants to know, to clear.
+        self.looked_at: dict[str, None] = {}
         #: Of those that come from other processes: how many there were, and whether more came.
         self._outside: dict[str, tuple[int, bool]] = {}
         for name, line in corridor.delivery.lines.items():
@@ -47,6 +49,7 @@ class Histories:
         for name in sorted(names_read(corridor.plan) - self._histories.keys()):
             self._keep(name)
             self._outside[name] = (0, False)
+        self._keep_no_waveforms()
 
     def __getitem__(self, name: str) -> TopicHistory:
         """History of a topic; InputError if nobody sends on it."""
@@ -60,8 +63,19 @@ class Histories:
             self._outside[name] = (history.count, topic is not None and topic.qos is STREAM)
         return history
 
+    def _keep_no_waveforms(self) -> None:
+        """Let go of what is large, until somebody asks for it."""
+        for name, line in self._corridor.delivery.lines.items():
+            kind = kind_of(name)
+            if kind is not None and kind.view is Waveform:
+                line.gathers = False
+                line.early.clear()
+
     def after_tick(self) -> None:
-        """Wait for what other processes send in every tick."""
+        """Keep what has begun to be sent; wait for what other processes send in every tick."""
+        for name, line in list(self._corridor.delivery.lines.items()):
+            if line.gathers and line.early:
+                self._keep(name)
         for name, (count, regular) in self._outside.items():
             history = self._histories[name]
             if regular:
@@ -89,7 +103,8 @@ class Histories:
 
     def _keep(self, name: str) -> None:
         topic, kind = kind_of(name), self.kind(name)
-        history = TopicHistory(name, topic, kind, lambda: self._corridor.ticks - 1)
+        tick = lambda: self._corridor.ticks - 1  # noqa: E731
+        history = TopicHistory(name, topic, kind, tick, self.looked_at)
         reader = LocalReader(self._node, self._fail, history.take, history.take)
 
         def subscribe() -> None:
@@ -98,8 +113,10 @@ class Histories:
                 kind, name, self._node.guarded(history.take), qos, raw=True
             )
 
-        for message in self._corridor.delivery.line(name).early:
+        line = self._corridor.delivery.line(name)
+        for message in line.early:
             history.take(message)
+        line.gathers = False
         self._corridor.delivery.read(name, reader, subscribe)
         self._histories[name] = history
 

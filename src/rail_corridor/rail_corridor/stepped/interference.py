@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -11,7 +12,6 @@ from lifecycle_msgs.srv import ChangeState
 from rail_corridor.errors import InputError
 from rail_corridor.plan.plan import WORLD
 from rail_corridor.plan.world_plan import world_file
-from rail_corridor.run.host import make_node
 from rail_corridor.scenario.model import Scenario
 
 from .corridor import StalledError, SteppedCorridor
@@ -72,8 +72,14 @@ class Interference:
             self._gone.add(each)
             corridor.call(partial(corridor.observer.announce_failure, each, reason))
 
-    def restart(self, name: str) -> None:
+    def restart(self, name: str, make: Callable[[], Any] | None = None) -> None:
         """Start a node anew, whether or not it is alive: it knows nothing of what was before.
+
+        Parameters
+        ----------
+        name : str
+        make : callable, optional
+            Makes it and has it spun, where it is none of the scenario's own.
 
         Raises
         ------
@@ -97,7 +103,11 @@ class Interference:
             corridor.spin(lambda: False, _HEARD_S)
         else:
             back = [name]
-            corridor.add_node(make_node(corridor.spec(name), corridor.context, False), name)
+            if make is not None:
+                make()
+                self._gone.discard(name)
+                return
+            corridor.add_node(corridor.made(corridor.spec(name)), name)
         self._gone.difference_update(back)
 
     def switch(self, name: str, *, on: bool) -> None:

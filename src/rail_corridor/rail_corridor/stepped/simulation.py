@@ -105,6 +105,7 @@ class Simulation:
             self._report = None
             try:
                 while corridor.step():
+                    histories.after_tick()
                     yield Tick(corridor.ticks - 1, corridor.time_s, corridor.truth, histories)
             finally:
                 self._report = corridor.report()

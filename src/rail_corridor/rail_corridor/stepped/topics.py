@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from rclpy.serialization import deserialize_message
 
 from rail_msgs_py.delivery import serialised
+from rail_msgs_py.position import Position
 from rail_msgs_py.table import Table
 from rail_msgs_py.topics.topic import Topic
 
@@ -18,12 +20,12 @@ class NotKnownError(ValueError):
 
 
 class NotKnown(float):
-    """NaN in a table: what is not known is neither more nor less than anything.
+    """NaN in a table: neither more nor less than anything, and so is what is computed from it.
 
     >>> value = NotKnown()
-    >>> value == value, value != value
-    (False, True)
-    >>> 3.0 <= value
+    >>> value == value, abs(value - 3.0)
+    (False, nan)
+    >>> 3.0 <= abs(value - 3.0)
     Traceback (most recent call last):
         ...
     rail_corridor.stepped.topics.NotKnownError: compared with a value that is not known
@@ -37,6 +39,24 @@ class NotKnown(float):
         raise NotKnownError("compared with a value that is not known")
 
     __lt__ = __le__ = __gt__ = __ge__ = _refuse
+
+    def __eq__(self, other: object) -> bool:
+        return False if other is self else self._refuse(other)  # as of NaN: a test for it
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __bool__(self) -> bool:
+        return self._refuse(None)
+
+    __hash__ = float.__hash__
+
+    def _unknown(self, *_: object) -> NotKnown:
+        return self
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = _unknown
+    __truediv__ = __rtruediv__ = __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = _unknown
+    __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = __round__ = _unknown  # type: ignore[assignment]
 
 
 class RowView:
@@ -117,6 +137,9 @@ def view_of(topic: Topic | None, kind: Any, message: Any) -> Any:
         message = deserialize_message(serialised(message), kind)
         if wanted is not None:
             message = wanted.from_msg(message)
+    if isinstance(message, Position) and not message.known:
+        # What it holds is the last that was known, which is no position now.
+        return replace(message, chainage_m=NotKnown(), speed_mps=NotKnown())
     if not isinstance(message, Table):
         return message
     if len(message.rows) != 1:
@@ -137,10 +160,20 @@ class TopicHistory:
     kind : message class
     tick : callable
         Number of the tick at hand.
+    looked_at : dict, optional
+        Is told the name of the topic whenever somebody looks at its messages.
     """
 
-    def __init__(self, name: str, topic: Topic | None, kind: Any, tick: Callable[[], int]) -> None:
+    def __init__(
+        self,
+        name: str,
+        topic: Topic | None,
+        kind: Any,
+        tick: Callable[[], int],
+        looked_at: dict[str, None] | None = None,
+    ) -> None:
         self.name = name
+        self._looked_at = {} if looked_at is None else looked_at
         self._topic, self._kind, self._tick = topic, kind, tick
         #: As they were sent: serialised, or as views.
         self.sent: list[Any] = []
@@ -155,6 +188,7 @@ class TopicHistory:
     @property
     def count(self) -> int:
         """Number of messages so far."""
+        self._looked_at[self.name] = None
         return len(self.sent)
 
     @property
@@ -166,6 +200,7 @@ class TopicHistory:
         LookupError
             If there is none yet.
         """
+        self._looked_at[self.name] = None
         if not self.sent:
             raise LookupError(f"{self.name}: nothing has been sent on it yet")
         return view_of(self._topic, self._kind, self.sent[-1])
@@ -176,6 +211,7 @@ class TopicHistory:
         return list(self)
 
     def __iter__(self) -> Iterator[Any]:
+        self._looked_at[self.name] = None
         return (view_of(self._topic, self._kind, message) for message in self.sent)
 
     def __len__(self) -> int:

@@ -140,7 +140,7 @@ class Quiet(Node):
 
 
 def test_an_ordinary_node_that_sends_nothing_fails_the_test(corridor: Make) -> None:
-    c = corridor("plain_line")
+    c = corridor("plain_line", timeout_s=0.5)
     c.add(Quiet, replaces="/wayside/zone_controller")
     with pytest.raises(NodeError, match=r"^/wayside/zone_controller at tick 0: has sent nothing"):
         c.run_to_end()

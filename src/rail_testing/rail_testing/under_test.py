@@ -6,6 +6,7 @@ import contextlib
 import os
 import signal
 import subprocess
+import textwrap
 import time
 from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +19,6 @@ from rail_corridor.stepped.corridor import SteppedCorridor
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.node import SOFTWARE, CorridorMixin
 from rail_msgs_py.topics.tick import DONE
-from rail_world.errors import shorten
 
 from .adoption import Adoption, Past
 
@@ -216,7 +216,7 @@ class NodesUnderTest:
         failures = session.observer.failures
         for entry in self._entries:
             if entry.process is not None and entry.process.poll() is not None:
-                words = shorten(" ".join(map(str, entry.command or ())))
+                words = textwrap.shorten(" ".join(map(str, entry.command or ())), 160)
                 said = f"ended with {entry.process.returncode}: {words}"
                 raise NodeError(self._line(entry, session, said))
             for failed in failures:

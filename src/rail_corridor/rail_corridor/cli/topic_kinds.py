@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 from importlib.metadata import entry_points
 from typing import Final
@@ -18,6 +19,7 @@ from rail_msgs_py.topics import (
 )
 from rail_msgs_py.topics.topic import Topic
 
+_REGISTRY: Final = "rail_corridor.equipment.registry"
 _BUILTIN: Final = (
     *tick.TOPICS,
     *world.TOPICS,
@@ -42,6 +44,11 @@ def kind_of(name: str) -> Topic | None:
     return found
 
 
-@cache
 def _others_have_equipment() -> bool:
+    """Whether it may be; once all equipment is loaded asking it costs nothing."""
+    return _REGISTRY in sys.modules or _has_entry_points()
+
+
+@cache
+def _has_entry_points() -> bool:
     return bool(entry_points(group="rail_corridor.equipment"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -113,6 +114,7 @@ def test_hundreds_of_nodes_in_one_process_end_at_once(
     ("first", "second", "number", "code"),
     [
         ("wayside", "onboard", signal.SIGINT, 128 + signal.SIGINT),
+        ("onboard", "wayside", signal.SIGTERM, 128 + signal.SIGTERM),
         ("onboard", "wayside", signal.SIGKILL, -signal.SIGKILL),
     ],
 )
@@ -124,9 +126,11 @@ def test_the_halves_of_a_corridor_end_together(
     halves = {part: rail.start(*arguments, part) for part in (first, second)}
     # Each half looks for the other twice a second.
     listener.until(lambda: len(clock) > 30)
+    asked_s = time.monotonic()
     halves[first].send_signal(number)
     assert rail.finish(halves[first]) == code
     assert rail.finish(halves[second]) == 3
+    assert time.monotonic() - asked_s < 20.0
     line = f"the {first} half has ended: so this one ends"
     assert line in rail.output(halves[second])
 

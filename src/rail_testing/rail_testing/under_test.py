@@ -129,17 +129,17 @@ class NodesUnderTest:
                     raise InputError(reason, field="command", value=entry.command[0]) from None
             if entry.node is not None:
                 entry.made_by = entry.node if callable(entry.node) else None
-                self._bring_in(entry, session, past)
+                self._bring_in(entry, session)
 
-    def _bring_in(self, entry: UnderTest, session: SteppedCorridor, past: Past) -> None:
+    def _bring_in(self, entry: UnderTest, session: SteppedCorridor) -> None:
         """Make a node, if it is told how, and let it take part."""
         again = entry.done is not None
-        entry.node = self._made(entry, session, past)
+        entry.node = self._made(entry, session)
         session.add_node(entry.node, entry.replaces)
         if isinstance(entry.node, CorridorMixin):
             return
         if entry.attach and entry.adoption is None:
-            self._adopt(entry, entry.node, session, past)
+            self._adopt(entry, entry.node, session)
         if entry.replaces and not again:
             self._answer_for(entry, entry.replaces, session)
 
@@ -154,12 +154,12 @@ class NodesUnderTest:
 
             def make(entry: UnderTest = entry) -> None:
                 entry.node, entry.adoption = entry.made_by, None
-                self._bring_in(entry, session, self._past)
+                self._bring_in(entry, session)
 
             return make
         return None
 
-    def _made(self, entry: UnderTest, session: SteppedCorridor, past: Past) -> Any:
+    def _made(self, entry: UnderTest, session: SteppedCorridor) -> Any:
         """The node itself, made if it is told how."""
         node = entry.node
         if not callable(node):
@@ -177,7 +177,7 @@ class NodesUnderTest:
             elif entry.attach and isinstance(node, type) and issubclass(node, Node):
                 # Adopted before it begins, so that what it says at once is heard.
                 made = object.__new__(node)
-                self._adopt(entry, made, session, past)
+                self._adopt(entry, made, session)
                 begin: Callable[[], None] = made.__init__
                 begin()
             else:
@@ -186,10 +186,9 @@ class NodesUnderTest:
             made.switch_on()
         return made
 
-    @staticmethod
-    def _adopt(entry: UnderTest, node: Any, session: SteppedCorridor, past: Past) -> None:
+    def _adopt(self, entry: UnderTest, node: Any, session: SteppedCorridor) -> None:
         """Let an ordinary node have its messages in time."""
-        entry.adoption = Adoption(node, session.delivery, session.context.tap, past)
+        entry.adoption = Adoption(node, session.delivery, session.context.tap, self._past)
 
     def _answer_for(self, entry: UnderTest, name: str, session: SteppedCorridor) -> None:
         """Say on behalf of an ordinary node what it does not know that it has to say."""

@@ -101,10 +101,13 @@ class Histories:
             return line.kind
         return self._kind_outside(name)
 
+    def _tick(self) -> int:
+        """Number of the tick at hand."""
+        return self._corridor.ticks - 1
+
     def _keep(self, name: str) -> None:
         topic, kind = kind_of(name), self.kind(name)
-        tick = lambda: self._corridor.ticks - 1  # noqa: E731
-        history = TopicHistory(name, topic, kind, tick, self.looked_at)
+        history = TopicHistory(name, topic, kind, self._tick, self.looked_at)
         reader = LocalReader(self._node, self._fail, history.take, history.take)
 
         def subscribe() -> None:

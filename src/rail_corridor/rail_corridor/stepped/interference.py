@@ -105,9 +105,8 @@ class Interference:
             back = [name]
             if make is not None:
                 make()
-                self._gone.discard(name)
-                return
-            corridor.add_node(corridor.made(corridor.spec(name)), name)
+            else:
+                corridor.add_node(corridor.made(corridor.spec(name)), name)
         self._gone.difference_update(back)
 
     def switch(self, name: str, *, on: bool) -> None:

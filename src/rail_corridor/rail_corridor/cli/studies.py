@@ -13,8 +13,75 @@ from .usage import ScenarioArgument, TrackOption, UsageError, check_choice, chec
 
 def add_to(app: typer.Typer) -> None:
     """Add the commands to the application."""
-    for command in (campaign, sweep, accuracy):
+    for command in (study, campaign, sweep, accuracy):
         app.command()(command)
+
+
+def study(
+    what: Annotated[
+        str,
+        typer.Argument(help="A study file, or one that comes with the corridor.", metavar="STUDY"),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="Folder of the results; STUDY.study if not given.", metavar="DIR"
+        ),
+    ] = None,
+    runs: Annotated[
+        int | None, typer.Option("--runs", help="Runs of each cell at most.", metavar="N", min=1)
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", help="Seed of the first run.", metavar="N", min=0)
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", help="Of this machine; one for each core.", metavar="N", min=1),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", help="Of a cluster of Dask: tcp://host:8786.", metavar="URL"),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the runs that there are.")
+    ] = False,
+    only: Annotated[
+        str | None,
+        typer.Option(
+            "--only", help="Make one run of one cell here, and show it.", metavar="CELL:RUN"
+        ),
+    ] = None,
+    compare: Annotated[
+        Path | None,
+        typer.Option(
+            "--compare", help="Folder of an earlier study: what has moved.", metavar="DIR"
+        ),
+    ] = None,
+) -> None:
+    """Make many runs of one question: rows, a summary with intervals, a picture."""
+    from rich.console import Console
+
+    from rail_corridor.studies.registry import CALCULATIONS, FOLDER, GENERATORS
+    from rail_corridor.study.run_study import exit_code, run_study
+    from rail_corridor.study.single_run import show_run
+    from rail_corridor.study.study_file import load_study
+
+    changes = {"runs": runs, "first_seed": seed}
+    loaded, source = load_study(what, FOLDER, GENERATORS, CALCULATIONS, changes)
+    console = Console()
+    if only is not None:
+        raise typer.Exit(show_run(loaded, source, only, console))
+    outcome = run_study(
+        loaded,
+        source,
+        out or Path(f"{loaded.name}.study"),
+        console,
+        scheduler=scheduler,
+        workers=workers,
+        resume=resume,
+        compare=compare,
+    )
+    raise typer.Exit(exit_code(outcome))
 
 
 def campaign(

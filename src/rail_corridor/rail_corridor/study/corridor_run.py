@@ -1,0 +1,60 @@
+"""One run of a corridor within this process, to its report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any, Final
+
+from rail_corridor.middleware.discovery import discover_on
+from rail_corridor.middleware.domain import free_domain
+from rail_corridor.run.kills import Kill
+from rail_corridor.scenario.model import Scenario
+from rail_corridor.stepped.corridor import SteppedCorridor
+from rail_corridor.stepped.interference import Interference
+
+#: Each such piece may take twice the time-out of a node [ticks].
+_PIECE: Final = 200
+
+
+def report_of_run(
+    scenario: Scenario, *, kills: Iterable[Kill] = (), timeout_s: float = 40.0
+) -> dict[str, Any]:
+    """Report of a scenario, as ``rail run`` writes it; its digest is the same.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    kills : iterable of Kill
+        Nodes that end before the first tick that is not earlier than their time.
+    timeout_s : float
+        Wall time without an answer after which a node counts as failed.
+
+    Raises
+    ------
+    StalledError
+        If it does not go on.
+    InputError
+        If there is no such node, or no ROS domain is free.
+    """
+    discover_on("this")
+    with free_domain() as domain:
+        corridor = SteppedCorridor(scenario, domain=domain, timeout_s=timeout_s)
+        try:
+            interference = Interference(corridor)
+            for kill in sorted(kills, key=lambda kill: kill.time_s):
+                _run_to(corridor, math.ceil(kill.time_s / scenario.tick_s - 1e-9))
+                if not corridor.finished:
+                    interference.kill(kill.node)
+            _run_to(corridor, None)
+            return corridor.report()
+        finally:
+            corridor.close()
+
+
+def _run_to(corridor: SteppedCorridor, ticks: int | None) -> None:
+    """Run to a number of ticks, or to the end."""
+    while not corridor.finished and (ticks is None or corridor.ticks < ticks):
+        wanted = _PIECE if ticks is None else min(_PIECE, ticks - corridor.ticks)
+        if not corridor.step(wanted):
+            return

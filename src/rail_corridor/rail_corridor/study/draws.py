@@ -1,0 +1,59 @@
+"""Laws that a study draws values of fields from."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Pair = tuple[float, float]
+
+
+class Draw(BaseModel):
+    """One law, by its name.
+
+    >>> Draw(uniform=(1.0, 3.0)).value(np.random.default_rng(1))
+    2.023643249400513
+    >>> Draw(choice=["siso", "mrc"]).value(np.random.default_rng(1))
+    'siso'
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    uniform: Pair | None = Field(None, description="from, to")
+    log_uniform: Pair | None = Field(None, description="from, to, both above zero")
+    normal: Pair | None = Field(None, description="mean, standard deviation")
+    integers: tuple[int, int] | None = Field(None, description="from, to, both included")
+    choice: tuple[Any, ...] | None = Field(None, description="any of these, equally likely")
+
+    @model_validator(mode="after")
+    def _is_one_law(self) -> Draw:
+        given = self.model_dump(exclude_none=True)
+        if len(given) != 1:
+            raise ValueError(f"must be one of {', '.join(type(self).model_fields)}")
+        (name, values), *_ = given.items()
+        if name == "choice":
+            if not values:
+                raise ValueError("choice: there is nothing to choose from")
+        elif name == "normal":
+            if not values[1] >= 0.0:
+                raise ValueError("normal: the standard deviation must not be below 0")
+        elif not values[0] <= values[1] or (name == "log_uniform" and not values[0] > 0.0):
+            raise ValueError(f"{name}: must be two values in order")
+        return self
+
+    def value(self, rng: np.random.Generator) -> Any:
+        """Draw one."""
+        if self.uniform is not None:
+            return float(rng.uniform(*self.uniform))
+        if self.log_uniform is not None:
+            low, high = self.log_uniform
+            return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+        if self.normal is not None:
+            return float(rng.normal(*self.normal))
+        if self.integers is not None:
+            return int(rng.integers(self.integers[0], self.integers[1] + 1))
+        assert self.choice is not None
+        return self.choice[int(rng.integers(len(self.choice)))]

@@ -1,0 +1,95 @@
+"""Figures of a report: where they stand, and what is made of several."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from rail_corridor.errors import InputError, did_you_mean
+
+Take = Literal["value", "sum", "min", "max", "mean", "count"]
+OverRuns = Literal["mean", "sum", "min", "max", "proportion"]
+
+
+class Figure(BaseModel):
+    """One figure of a run: a place in its report, and what must hold of it in every run."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    of: str | None = Field(
+        None,
+        description="place in the report, * for each of several; the figure's name if not said",
+    )
+    take: Take = Field("value", description="what is made of the values of one run")
+    over_runs: OverRuns = Field("mean", description="what is shown of many runs")
+    must_be: float | None = Field(None, description="verdict: in every run")
+    at_least: float | None = Field(None, description="verdict: in every run")
+    at_most: float | None = Field(None, description="verdict: in every run")
+
+    def violated_by(self, value: float | None) -> bool:
+        """Whether a value is not what it must be; one that is not known never is."""
+        asked = (self.must_be, self.at_least, self.at_most)
+        if value is None or math.isnan(value):
+            return any(each is not None for each in asked)
+        return (
+            (self.must_be is not None and value != self.must_be)
+            or (self.at_least is not None and not value >= self.at_least)
+            or (self.at_most is not None and not value <= self.at_most)
+        )
+
+
+def figure_of(name: str, figure: Figure, report: Mapping[str, Any]) -> float | None:
+    """Value of a figure in a report; None where it is not known.
+
+    Raises
+    ------
+    InputError
+        If the report has no such place.
+    """
+    place = figure.of or name
+    found = list(_at(report, place.split("."), f"figures.{name}", place))
+    values = [float(value) for value in found if isinstance(value, bool | int | float)]
+    match figure.take:
+        case "count":
+            return float(len([value for value in found if value is not None]))
+        case "sum":
+            return math.fsum(values)
+        case "value":
+            if len(found) > 1:
+                reason = "is many values in the report: take sum, min, max, mean or count of them"
+                raise InputError(reason, field=f"figures.{name}", value=place)
+            if found and found[0] is not None and not values:
+                raise InputError("is no number", field=f"figures.{name}", value=place)
+            return values[0] if values else None
+        case "mean":
+            return math.fsum(values) / len(values) if values else None
+        case _:
+            return {"min": min, "max": max}[figure.take](values) if values else None
+
+
+def _at(value: Any, path: Sequence[str], field: str, whole: str) -> Iterator[Any]:
+    if not path:
+        yield value
+        return
+    key, *rest = path
+    inside: Mapping[str, Any]
+    if isinstance(value, Mapping):
+        inside = value
+    elif isinstance(value, list):
+        inside = {str(index): each for index, each in enumerate(value)}
+    elif value is None:
+        yield None
+        return
+    else:
+        inside = {}
+    if key == "*":
+        for each in inside.values():
+            yield from _at(each, rest, field, whole)
+        return
+    if key not in inside:
+        reason = f"the report has no {key} there{did_you_mean(key, map(str, inside))}"
+        raise InputError(reason, field=field, value=whole)
+    yield from _at(inside[key], rest, field, whole)

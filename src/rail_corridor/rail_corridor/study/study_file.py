@@ -1,0 +1,132 @@
+"""Loading studies: a file, or one that comes with the corridor, validated before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from rail_corridor.errors import InputError, did_you_mean, from_validation
+from rail_corridor.loading.loader import builtin_scenarios
+from rail_corridor.yaml_file import load_yaml
+
+from .cells import case_of, cells_of
+from .model import Study
+from .sources import CalculationSource, GeneratorSource, ScenarioSource, Source, relative
+
+
+def load_study(
+    name_or_path: str,
+    folder: Path,
+    generators: Mapping[str, GeneratorSource],
+    calculations: Mapping[str, CalculationSource],
+    overrides: Mapping[str, Any] | None = None,
+) -> tuple[Study, Source]:
+    """Load a study and see that every value in it can be.
+
+    Parameters
+    ----------
+    name_or_path : str
+        A YAML file, or the name of one in ``folder``.
+    folder : Path
+        Studies that come with the corridor.
+    generators, calculations : mappings
+        What a study may name.
+    overrides : mapping, optional
+        Fields of the study that have other values: ``runs``, ``first_seed``.
+
+    Raises
+    ------
+    InputError
+        One line that names the file, the field and the value.
+    """
+    path = _find(name_or_path, folder)
+    data = {**load_yaml(path), **{k: v for k, v in (overrides or {}).items() if v is not None}}
+    try:
+        try:
+            study = Study.model_validate(data)
+        except ValidationError as error:
+            raise from_validation(error, data, Study.model_fields) from None
+        source = _source_of(study, path.parent, generators, calculations)
+        _check(study, source)
+    except InputError as error:
+        raise error.located(str(path)) from None
+    return study, source
+
+
+def _find(name: str, folder: Path) -> Path:
+    known = {path.stem: path for path in folder.glob("*.yaml")}
+    if name in known:
+        return known[name]
+    path = Path(name)
+    if path.suffix in (".yaml", ".yml") or path.exists():
+        return path
+    reason = f"no such study{did_you_mean(name, known)}; there are {', '.join(sorted(known))}"
+    raise InputError(reason, field="STUDY", value=name)
+
+
+def _source_of(
+    study: Study,
+    directory: Path,
+    generators: Mapping[str, GeneratorSource],
+    calculations: Mapping[str, CalculationSource],
+) -> Source:
+    if study.generator is not None:
+        found = _named(study.generator, generators, "generator")
+        return GeneratorSource(found.parameters, found.draw, study.parameters)
+    if study.calculation is not None:
+        known = _named(study.calculation, calculations, "calculation")
+        return CalculationSource(known.parameters, known.calculate, study.parameters)
+    assert study.scenario is not None
+    data, directory = _scenario_data(study.scenario, directory)
+    from .fields import with_fields
+
+    return ScenarioSource(with_fields(data, study.parameters), directory)
+
+
+def _named(name: str, known: Mapping[str, Any], field: str) -> Any:
+    if name not in known:
+        reason = f"there are {', '.join(sorted(known))}{did_you_mean(name, known)}"
+        raise InputError(reason, field=field, value=name)
+    return known[name]
+
+
+def _scenario_data(
+    scenario: str | dict[str, Any], directory: Path
+) -> tuple[Mapping[str, Any], Path]:
+    if isinstance(scenario, dict):
+        return scenario, directory
+    builtin = builtin_scenarios()
+    if scenario in builtin:
+        return load_yaml(builtin[scenario]), builtin[scenario].parent
+    path = directory / scenario
+    if not path.is_file():
+        reason = f"is neither built in nor beside the study{did_you_mean(scenario, builtin)}"
+        raise InputError(reason, field="scenario", value=scenario)
+    return load_yaml(path), path.parent
+
+
+def _check(study: Study, source: Source) -> None:
+    """See that every value of every field can be, with the first values of all others."""
+    where = {
+        **{name: f"parameters.{name}" for name in study.parameters},
+        **{name: f"vary.{name}" for name in study.vary},
+        **{name: f"draw.{name}" for name in study.draw},
+    }
+    cells = cells_of(study)
+    first = dict(case_of(study, cells, 0, 0).values)
+    changes: list[dict[str, Any]] = [{}]
+    changes += [{name: value} for name, values in study.vary.items() for value in values[1:]]
+    for change in changes:
+        values = {**first, **change}
+        try:
+            source.check(values, study.first_seed)
+        except InputError as error:
+            raise relative(error, {**study.parameters, **values}, where) from None
+
+
+def parameter_names(model: type[BaseModel]) -> tuple[str, ...]:
+    """Fields that a study may set of a generator or calculation."""
+    return tuple(model.model_fields)

@@ -1,0 +1,110 @@
+"""Figures, intervals and rules: against closed forms and by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from rail_corridor.errors import InputError
+from rail_corridor.study.figures import Figure, figure_of
+from rail_corridor.study.intervals import estimate
+from rail_corridor.study.model import Events, HalfWidth, Stop
+from rail_corridor.study.stopping import Stopping
+
+REPORT = {
+    "ticks": 10,
+    "complete": True,
+    "digest": "abc",
+    "failures": [{"node": "/a"}, {"node": "/b"}],
+    "trains": {"a": {"gap_m": 3.0, "atp": None}, "b": {"gap_m": None, "atp": {"trips": 2}}},
+}
+
+
+@pytest.mark.parametrize(
+    ("place", "take", "value"),
+    [
+        ("ticks", "value", 10.0),
+        ("complete", "value", 1.0),
+        ("failures.*.node", "count", 2.0),
+        ("trains.*.gap_m", "min", 3.0),
+        ("trains.*.gap_m", "sum", 3.0),
+        ("trains.*.atp.trips", "max", 2.0),
+        ("trains.a.atp.trips", "value", None),
+    ],
+)
+def test_a_figure_is_found_by_its_place(place: str, take: str, value: float | None) -> None:
+    assert figure_of("x", Figure(of=place, take=take), REPORT) == value  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("tick", "the report has no tick there, did you mean ticks"),
+        ("trains.*.gap", "has no gap there, did you mean gap_m"),
+        ("trains.*.gap_m", "is many values"),
+        ("digest", "is no number"),
+    ],
+)
+def test_a_place_that_there_is_not_is_one_line(place: str, said: str) -> None:
+    with pytest.raises(InputError, match=rf"^figures\.x: '{place.replace('*', '.')}': .*{said}"):
+        figure_of("x", Figure(of=place), REPORT)
+
+
+@pytest.mark.parametrize("figure", [Figure(must_be=0), Figure(at_most=0), Figure(at_least=1)])
+def test_what_must_hold_is_violated_by_what_is_not_known(figure: Figure) -> None:
+    assert figure.violated_by(None) and figure.violated_by(math.nan)
+    assert figure.violated_by(0.5)
+    assert not figure.violated_by(1.0 if figure.at_least else 0.0)
+
+
+def test_the_interval_of_a_proportion_is_exact() -> None:
+    values = [1.0] * 3 + [0.0] * 17
+    found = estimate(values, "proportion")
+    assert found.value == 0.15
+    # Clopper and Pearson: the probability of as many or more at the low end is 2.5 %.
+    assert binom.sf(2, 20, found.low) == pytest.approx(0.025)
+    assert binom.cdf(3, 20, found.high) == pytest.approx(0.025)
+    assert estimate([0.0] * 9, "proportion").low == 0.0
+    assert estimate([1.0] * 9, "proportion").high == 1.0
+
+
+def test_the_interval_of_a_mean_holds_it_in_19_of_20() -> None:
+    rng = np.random.default_rng(3)
+    draws = rng.normal(5.0, 2.0, (2000, 8))
+    hits = sum((e := estimate(row.tolist(), "mean")).low <= 5.0 <= e.high for row in draws)
+    assert hits / 2000 == pytest.approx(0.95, abs=4 * math.sqrt(0.95 * 0.05 / 2000))
+
+
+def test_what_is_not_known_counts_for_nothing() -> None:
+    assert estimate([1.0, math.nan, 3.0], "mean").value == 2.0
+    assert estimate([math.nan], "sum").runs == 0
+
+
+def test_a_cell_ends_with_the_same_run_however_they_come_in() -> None:
+    figures = {"errors": Figure(over_runs="sum")}
+    rule = Stop(events=Events(figure="errors", count=5))
+    for order in ([0, 1, 2, 3, 4, 5], [5, 3, 1, 4, 2, 0], [2, 0, 5, 1, 4, 3]):
+        stopping = Stopping(rule, figures, runs=100)
+        for run in order:
+            stopping.add(run, {"errors": 2.0})
+        assert stopping.ended == 3
+
+
+def test_a_narrow_interval_ends_a_cell_and_failures_do_not_count() -> None:
+    figures = {"x": Figure(), "p": Figure(over_runs="proportion")}
+    stopping = Stopping(Stop(half_width=HalfWidth(figure="x", below=0.5)), figures, runs=1000)
+    rng = np.random.default_rng(4)
+    run = 0
+    while stopping.ended is None:
+        stopping.add(run, None if run % 3 == 0 else {"x": float(rng.normal())})
+        run += 1
+    # 1.96 / sqrt(n) is 0.5 for n = 16: two of three runs count.
+    assert 15 <= stopping.ended <= 40
+    most = Stopping(Stop(), figures, runs=7)
+    for run in range(7):
+        assert most.ended is None
+        most.add(run, {"x": 0.0})
+    assert most.ended == 7

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from rail_corridor.study.sources import CalculationSource, Drawn, GeneratorSource
+from rail_signals.localizer.settings import LocalizerSettings, Sensor
+from rail_signals.localizer.study.campaign import tally
+from rail_signals.localizer.study.faults import CASES, FaultKind
+from rail_signals.localizer.study.simulation import SimulatedLine
+from rail_signals.train_bus.faults import KINDS
+from rail_signals.train_bus.study.campaign import HEALTHY, examine
+from rail_signals.train_bus.study.campaign import draw_case as draw_bus_case
 from rail_world.train_radio.frame_threats import Threat
 
 from .handover_scenarios import MOST_TRAINS, Situation, scenario_data
@@ -79,10 +88,98 @@ def count_threats(parameters: ThreatParameters, seed: int) -> Mapping[str, float
     }
 
 
+class IntegrityParameters(_Parameters):
+    """Trains on a simulated line, each with one fault of one sensor."""
+
+    fault: str = "none"
+    trains: int = Field(100, ge=1, le=10_000)
+    ticks: int = Field(1500, ge=500, le=100_000)
+
+    @field_validator("fault")
+    @classmethod
+    def _is_one(cls, value: str) -> str:
+        if value not in INTEGRITY_FAULTS:
+            raise ValueError(f"must be one of {', '.join(INTEGRITY_FAULTS)}")
+        return value
+
+
+class TrainBusParameters(_Parameters):
+    """A train bus with one fault, or none."""
+
+    fault: str = HEALTHY
+    snr_db: float = Field(60.0, ge=0.0, le=120.0)
+
+    @field_validator("fault")
+    @classmethod
+    def _is_one(cls, value: str) -> str:
+        if value not in (*KINDS, HEALTHY):
+            raise ValueError(f"must be one of {', '.join((*KINDS, HEALTHY))}")
+        return value
+
+
+#: Faults of the localizer's sensors by name, as ``range bias``; None: without any.
+INTEGRITY_FAULTS: Final[Mapping[str, tuple[Sensor, FaultKind] | None]] = {
+    "none": None,
+    **{f"{sensor.name.lower()} {kind.value}": (sensor, kind) for sensor, kind in CASES},
+}
+
+
+def count_integrity(parameters: IntegrityParameters, seed: int) -> Mapping[str, float | None]:
+    """Positions that were claimed, and misleading; see `rail_signals.localizer.study.campaign`."""
+    number = list(INTEGRITY_FAULTS).index(parameters.fault)
+    sensor, kind = INTEGRITY_FAULTS[parameters.fault] or (None, None)
+    counted = tally(
+        LocalizerSettings(direction=1 - 2 * (number % 2)),
+        SimulatedLine(),
+        sensor,
+        kind,
+        runs=parameters.trains,
+        ticks=parameters.ticks,
+        rng=np.random.default_rng([seed, number]),
+    )
+    return {
+        "positions": counted.positions,
+        "claimed": counted.claimed,
+        "protected": counted.protected,
+        "misleading": counted.misleading,
+        "misleading_trains": counted.misleading_runs,
+        "misleading_speeds": counted.misleading_speeds,
+        "false_alarms": counted.false_alarms,
+        "wrong_exclusions": counted.wrong_exclusions,
+        "due": counted.due,
+        "late": counted.late,
+        "delay_p95_s": _highest(counted.delays_s, 0.95),
+        "protection_mean_m": float(counted.protection_m.mean()),
+        "rmse_m": float(np.sqrt(np.mean(counted.error_m**2))),
+    }
+
+
+def _highest(values: np.ndarray, share: float) -> float | None:
+    """The value that so many are not above."""
+    ordered = np.sort(values)
+    return float(ordered[math.ceil(share * ordered.size) - 1]) if ordered.size else None
+
+
+def examine_train_bus(parameters: TrainBusParameters, seed: int) -> Mapping[str, float | None]:
+    """Whether a fault is found; see `rail_signals.train_bus.study.campaign`."""
+    number = (*KINDS, HEALTHY).index(parameters.fault)
+    rng = np.random.default_rng([seed, number])
+    case = draw_bus_case(parameters.fault, rng, parameters.snr_db)
+    result = examine(case, rng)
+    healthy = parameters.fault == HEALTHY
+    return {
+        "found": result.reported != HEALTHY,
+        "located": None if healthy else bool(result.is_located),
+        "named": result.reported == parameters.fault,
+    }
+
+
 GENERATORS: Final[Mapping[str, GeneratorSource]] = {
     "kills": GeneratorSource(KillParameters, draw_kill),
     "handover": GeneratorSource(HandoverParameters, draw_handover),
 }
 CALCULATIONS: Final[Mapping[str, CalculationSource]] = {
     "threats": CalculationSource(ThreatParameters, count_threats),
+    "integrity": CalculationSource(IntegrityParameters, count_integrity),
+    "train_bus": CalculationSource(TrainBusParameters, examine_train_bus),
 }

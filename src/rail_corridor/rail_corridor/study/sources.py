@@ -125,7 +125,8 @@ class CalculationSource:
 
     def run(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> Outcome:
         """See `Source`."""
-        report = dict(self.calculate(checked(self.parameters, {**self.fixed, **values}), seed))
+        given = self.calculate(checked(self.parameters, {**self.fixed, **values}), seed)
+        report = {name: None if each is None else float(each) for name, each in given.items()}
         if not figures:
             return Outcome({}, report)
         return Outcome({}, {name: figure_of(name, each, report) for name, each in figures.items()})

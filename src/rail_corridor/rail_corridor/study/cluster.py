@@ -6,18 +6,15 @@ import logging
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import Any
 
 from rail_corridor.errors import InputError
-
-if TYPE_CHECKING:
-    from distributed import Client
 
 _PATIENCE_S = 20.0
 
 
 @contextmanager
-def client_of(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """Connect to a scheduler, or start workers here; they end with the block.
 
     Parameters
@@ -33,7 +30,9 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         If nobody answers there.
     """
     import dask
-    from distributed import Client, LocalCluster
+    import distributed
+
+    untyped: Any = distributed
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     # Runs compute on one core each; numbers of threads are for who calls libraries at will.
@@ -41,7 +40,7 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Client]:
     with dask.config.set({"distributed.nanny.pre-spawn-environ": alone}):
         if scheduler is not None:
             try:
-                client = Client(scheduler, timeout=_PATIENCE_S)
+                client = untyped.Client(scheduler, timeout=_PATIENCE_S)
             except (OSError, ValueError, TimeoutError) as error:
                 said = str(error).split(" after ")[0] or type(error).__name__
                 raise InputError(said, field="--scheduler", value=scheduler) from None
@@ -50,7 +49,7 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Client]:
             return
         count = workers or len(os.sched_getaffinity(0))
         with (
-            LocalCluster(
+            untyped.LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
                 processes=True,
@@ -58,6 +57,6 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Client]:
                 silence_logs=logging.CRITICAL,
                 host="127.0.0.1",
             ) as cluster,
-            Client(cluster) as client,
+            untyped.Client(cluster) as client,
         ):
             yield client

@@ -11,7 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from rail_corridor.errors import InputError
 
@@ -19,9 +19,6 @@ from .cells import Case
 from .figures import Figure
 from .journal import Entry
 from .sources import Source
-
-if TYPE_CHECKING:
-    from distributed import Client, Future
 
 #: Work of a task that is worth sending [s].
 _WORTH_S: Final = 0.5
@@ -81,7 +78,7 @@ class Engine:
 
     def __init__(
         self,
-        client: Client,
+        client: Any,
         source: Source,
         figures: Mapping[str, Figure],
         timeout_s: float,
@@ -89,7 +86,7 @@ class Engine:
     ) -> None:
         self._client, self._source, self._figures = client, source, figures
         self._timeout_s, self._grace_s = timeout_s, grace_s
-        self._under_way: dict[Future, _Task] = {}
+        self._under_way: dict[Any, _Task] = {}
         self._again: deque[Case] = deque()
         self._tried: set[tuple[int, int]] = set()
         self._mean_s = _WORTH_S
@@ -138,12 +135,12 @@ class Engine:
 
     def _come_in(self) -> Iterator[Entry]:
         """What has ended, after a while at the latest."""
-        from distributed import TimeoutError as WaitTimeoutError
-        from distributed import wait
+        import distributed
 
+        untyped: Any = distributed
         try:
-            done = wait(list(self._under_way), _LOOK_S, "FIRST_COMPLETED").done
-        except WaitTimeoutError:
+            done = untyped.wait(list(self._under_way), _LOOK_S, "FIRST_COMPLETED").done
+        except distributed.TimeoutError:
             done = set()
         for future in done:
             task = self._under_way.pop(future)

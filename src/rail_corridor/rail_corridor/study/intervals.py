@@ -54,5 +54,5 @@ def estimate(values: Sequence[float], how: OverRuns) -> Estimate:
             return Estimate(mean, nan, nan, n)
         reach = float(t.ppf((1 + _LEVEL) / 2, n - 1)) * float(known.std(ddof=1)) / math.sqrt(n)
         return Estimate(mean, mean - reach, mean + reach, n)
-    value = {"sum": math.fsum, "min": min, "max": max}[how](known.tolist())
+    value = math.fsum(known) if how == "sum" else known.min() if how == "min" else known.max()
     return Estimate(float(value), nan, nan, n)

@@ -67,8 +67,9 @@ def write_parquet(path: Path, rows: Rows, entries: Iterable[Entry]) -> bool:
     """Write a Parquet file; whether that could be, which takes pyarrow."""
     if importlib.util.find_spec("pyarrow") is None:
         return False
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    from importlib import import_module
+
+    pa, pq = import_module("pyarrow"), import_module("pyarrow.parquet")
 
     table = [rows.row(entry) for entry in entries]
     columns = {name: [row[name] for row in table] for name in rows.columns}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from .figures import Figure
+from .figures import Figure, OverRuns
 from .intervals import estimate
 from .model import Stop
 
@@ -63,5 +63,5 @@ class Stopping:
         if rule.half_width is None or len(self._values) < rule.half_width.least_runs:
             return False
         how = self._figures[rule.half_width.figure].over_runs
-        kind = "proportion" if how == "proportion" else "mean"
+        kind: OverRuns = "proportion" if how == "proportion" else "mean"
         return estimate(self._values, kind).half_width <= rule.half_width.below

@@ -59,6 +59,7 @@ ONBOARD = "rail_onboard/rail_onboard"
 WAYSIDE = "rail_wayside/rail_wayside"
 MESSAGES = "rail_msgs_py/rail_msgs_py/train_radio"
 LOCALIZER = "rail_signals/rail_signals/localizer"
+_TRACK_CODE_STUDY = "rail_signals/rail_signals/track_code/study"
 
 
 @dataclass(frozen=True)
@@ -280,17 +281,49 @@ MUTANTS: list[Mutant] = [
     ),
     # Campaigns.
     *_group(
-        f"{CORRIDOR}/studies/handover.py",
+        f"{CORRIDOR}/studies/builtin/handover.yaml",
         "rail_corridor/studies/test_verdicts.py",
-        ("false places violate nothing", " + self.misleading_ticks", ""),
-        ("missed handovers violate nothing", "return self.missed + ", "return "),
+        (
+            "false places violate nothing",
+            "phase_ranging.misleading_ticks, take: sum, over_runs: sum, must_be: 0",
+            "phase_ranging.misleading_ticks, take: sum, over_runs: sum",
+        ),
+        (
+            "missed handovers violate nothing",
+            "handovers.missed, take: sum, over_runs: sum, must_be: 0",
+            "handovers.missed, take: sum, over_runs: sum",
+        ),
+    ),
+    *_group(
+        f"{CORRIDOR}/studies/builtin/kills.yaml",
+        "rail_corridor/studies/test_verdicts.py",
+        ("to touch is no collision", "at_least: 0.001", "at_least: 0.0"),
     ),
     *_group(
         f"{CORRIDOR}/studies/kills.py",
         "rail_corridor/studies/test_verdicts.py",
-        ("collisions are 0", "return not self.least_gap_m > 0.0", "return False"),
-        ("to touch is no collision", "not self.least_gap_m > 0.0", "self.least_gap_m < 0.0"),
-        ("kill campaigns pass", "return 1 if any(row.violations", "return 0 if any(row.violations"),
+        ("any death is that of the node", 'failed["node"] == node', "True"),
+        ("every run went on", 'report["complete"] and report["ticks"] == ticks', "True"),
+    ),
+    *_group(
+        f"{CORRIDOR}/study/summary.py",
+        "rail_corridor/studies/test_verdicts.py",
+        ("nothing is a violation", "if figure.violated_by(", "if not figure.violated_by("),
+    ),
+    *_group(
+        f"{CORRIDOR}/study/stopping.py",
+        "rail_corridor/study/test_figures.py",
+        (
+            "a cell ends as runs come in",
+            "while self.ended is None and self.seen in self._waiting",
+            "while self._waiting",
+        ),
+        ("an interval is never narrow", "found.half_width <= rule", "found.half_width > rule"),
+    ),
+    *_group(
+        f"{CORRIDOR}/study/intervals.py",
+        "rail_corridor/study/test_figures.py",
+        ("intervals of means are too narrow", "math.sqrt(n)", "n"),
     ),
     *_group(
         f"{CORRIDOR}/studies/threats.py",
@@ -317,6 +350,27 @@ MUTANTS: list[Mutant] = [
         "rail_signals/rail_signals/train_bus/study/campaign.py",
         "rail_signals/train_bus/study/test_verdicts.py",
         ("located within 5 m", "max(0.5, 0.01 *", "max(5.0, 0.01 *"),
+    ),
+    *_group(
+        f"{CORRIDOR}/studies/integrity.py",
+        "rail_corridor/studies/test_integrity_study.py",
+        (
+            "misleading positions of the study are 0",
+            '"misleading": counted.misleading,',
+            '"misleading": 0,',
+        ),
+        ("every world is as believed", "WORLDS[parameters.world]", "WORLDS[AS_BELIEVED]"),
+        (
+            "a fault that is never found is found at once",
+            "found if math.isfinite(found) else None",
+            "found if math.isfinite(found) else 0.0",
+        ),
+    ),
+    *_group(
+        f"{CORRIDOR}/studies/train_bus.py",
+        "rail_corridor/studies/test_train_bus_study.py",
+        ("any name is the right one", "result.reported == fault", "is_reported"),
+        ("no healthy train is flagged", 'counts["flagged"] += is_reported', "pass"),
     ),
     # Ranging.
     *_group(
@@ -380,6 +434,50 @@ MUTANTS: list[Mutant] = [
         " ::test_a_level_in_no_window_is_no_word",
         ("no change is noticed", "is_changed[hop] = change_hz >", "is_changed[hop] = 0.0 >"),
         ("a level in no window passes", "clear &= (level <= limits[1]) |", "clear &= True |"),
+    ),
+    *_group(
+        f"{_TRACK_CODE_STUDY}/words.py",
+        "rail_signals/track_code/study/test_words.py",
+        (
+            "one right check bit passes a random word",
+            "(found == self.syndrome).all(axis=-1)",
+            "(found == self.syndrome).any(axis=-1)",
+        ),
+    ),
+    *_group(
+        f"{_TRACK_CODE_STUDY}/low_rate_chain.py",
+        "rail_signals/track_code/study/test_low_rate_chain.py",
+        (
+            "any two valid slots confirm a word",
+            "valid[:, 1:] & valid[:, :-1] & same",
+            "valid[:, 1:] & valid[:, :-1]",
+        ),
+        ("noise of the levels is not looked at", "clear & quiet &", "clear &"),
+    ),
+    *_group(
+        f"{_TRACK_CODE_STUDY}/chain_errors.py",
+        "rail_signals/track_code/study/test_chain_errors.py",
+        (
+            "undetected wrong messages are 0",
+            "undetected += int(np.count_nonzero(valid & ~right))",
+            "pass",
+        ),
+        (
+            "words made of noise are 0",
+            "errors += int(np.count_nonzero(decided.confirmed[:, 1:]))",
+            "pass",
+        ),
+    ),
+    *_group(
+        f"{_TRACK_CODE_STUDY}/fit_errors.py",
+        "rail_signals/track_code/study/test_fit_errors.py",
+        ("no message of a fit is wrong", "(found != sent)", "(found != found)"),
+        ("slots count before a word is found", "k >= first and (k", "(k"),
+    ),
+    *_group(
+        f"{CORRIDOR}/studies/track_code_errors.py",
+        "rail_corridor/studies/test_track_code_errors.py",
+        ("track code errors of the study are 0", '"errors": counted.errors,', '"errors": 0,'),
     ),
     *_group(
         f"{WAYSIDE}/track_code/code_logic.py",

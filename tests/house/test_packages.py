@@ -125,7 +125,7 @@ ROSDEP_KEYS = {
     "zstandard": "mcap-ros2-support",
 }
 #: Modules without a key: README.md says where they come from.
-WITHOUT_KEY = {"nicegui", "pyinstrument"}
+WITHOUT_KEY = {"dask", "distributed", "nicegui", "pyinstrument"}
 
 
 def imported_modules(package: str) -> set[str]:

@@ -316,6 +316,16 @@ class LocalDelivery:
         if time.monotonic() < self.until_s:
             self.run()
 
+    def close(self) -> None:
+        """Forget nodes and executor; harmless when called again.
+
+        The executor holds what it calls where the collector cannot see it: what knew both would
+        never be freed, and a process could not make run after run.
+        """
+        self._executor = None
+        for kept in (self._ears, self._lines, self._queue, self._unsettled, self._when_idle):
+            kept.clear()
+
     def going_round(self) -> str:
         """What still waits, in words; nothing if nothing does."""
         lines = {id(r): name for name, line in self._lines.items() for r in line.readers}

@@ -1,10 +1,9 @@
-"""The kill campaign, short of running it: what is drawn, what is refused, and what is judged."""
+"""The study of kills, short of running it: what is drawn, and what is refused."""
 
 from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -15,15 +14,14 @@ from rail_corridor.errors import InputError
 from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.plan.plan import WORLD, make_plan
 from rail_corridor.run.kills import FaultInjector, Kill, check_kills, parse_kill
-from rail_corridor.studies.kill_scenarios import (
+from rail_corridor.studies.kills import (
     DURATION_S,
     KINDS,
-    TICK_S,
-    TRAINS,
-    draw_case,
+    KillParameters,
+    draw_kill,
     equipment_of,
 )
-from rail_corridor.studies.kills import row_of
+from rail_corridor.study.sources import Drawn
 
 SEEDS = range(40)
 WRS = NodeSpec("wrs", "/wayside/wrs1", "wayside")
@@ -31,45 +29,26 @@ MEDIUM = NodeSpec("radio_medium", "/world/radio_medium", "world")
 GROUPS = {"world": [NodeSpec("world", WORLD, "world"), MEDIUM], "wrs1": [WRS]}
 
 
-def report_of(**changes: Any) -> dict[str, Any]:
-    """Report of a good run; changes go into the sections of the last train."""
-    trains = {}
-    for name in TRAINS:
-        cbtc = {"forged_accepted": 0, "mislocated": 0}
-        atp = {
-            "interventions": 1,
-            "emergency_brakes": 0,
-            "overspeed_s": 0.0,
-            "passed_authority": 0,
-            "margin_min_m": None if name == "first" else 30.0,
-        }
-        trains[name] = {"distance_m": 500.0, "atp": atp, "cbtc": cbtc}
-    for section in ("atp", "cbtc"):
-        part = trains["third"][section]
-        assert isinstance(part, dict)
-        part.update({key: value for key, value in changes.items() if key in part})
-    node = changes.get("failed", draw_case(1).kill.node)
-    return {
-        "complete": True,
-        "ticks": round(DURATION_S / TICK_S),
-        "failures": [{"node": node}],
-        "trains": trains,
-    } | {key: value for key, value in changes.items() if key == "ticks"}
+def drawn(seed: int) -> Drawn:
+    """Return what is drawn from a seed."""
+    return draw_kill(KillParameters(), seed)
 
 
 def test_a_case_depends_on_its_seed_alone() -> None:
-    assert draw_case(7) == draw_case(7)
-    assert draw_case(7) != draw_case(8)
+    assert drawn(7) == drawn(7)
+    assert drawn(7) != drawn(8)
 
 
 def test_every_kind_dies_and_every_case_can_be_run() -> None:
-    cases = [draw_case(seed) for seed in SEEDS]
-    assert set(Counter(case.kind for case in cases)) == set(KINDS)
+    cases = [drawn(seed) for seed in SEEDS]
+    assert set(Counter(case.facts["kind"] for case in cases)) == set(KINDS)
     assert 8 < sum("faults" in case.data for case in cases) < 32
     for case in cases:
         scenario = parse_scenario(case.data)
-        assert case.kill.node in equipment_of(scenario)[case.kind]
-        assert 0.0 < case.kill.time_s < DURATION_S - 20.0
+        (kill,) = case.kills
+        assert kill.node in equipment_of(scenario)[case.facts["kind"]]
+        assert kill.node == case.facts["node"]
+        assert 0.0 < kill.time_s < DURATION_S - 20.0
         assert len(bases_of(scenario)) == 3
         starts_m = [train.start_m for train in scenario.trains]
         lengths_m = [train.vehicle.length_m for train in scenario.trains]
@@ -79,33 +58,10 @@ def test_every_kind_dies_and_every_case_can_be_run() -> None:
 
 
 def test_all_equipment_of_the_plan_can_be_drawn(tmp_path: Path) -> None:
-    scenario = parse_scenario(draw_case(1).data)
+    scenario = parse_scenario(drawn(1).data)
     planned = Counter(spec.name for spec in make_plan(scenario, tmp_path).nodes)
-    drawn = Counter(name for names in equipment_of(scenario).values() for name in names)
-    assert planned == drawn + Counter([WORLD])
-
-
-def test_a_good_run_is_no_violation() -> None:
-    row = row_of(draw_case(1), report_of())
-    assert row.violations == ()
-    assert (row.least_gap_m, row.braked, row.touched) == (30.0, 3, False)
-
-
-@pytest.mark.parametrize(
-    ("changes", "violation"),
-    [
-        ({"passed_authority": 1}, "passed its end of authority"),
-        ({"margin_min_m": 0.0}, "touched another train"),
-        ({"margin_min_m": -3.0}, "touched another train"),
-        ({"overspeed_s": 0.25}, "overspeed"),
-        ({"forged_accepted": 1}, "authority that nobody gave"),
-        ({"mislocated": 2}, "wrong place believed"),
-        ({"ticks": 100}, "did not go on"),
-        ({"failed": "/another"}, "the dead node was not missed"),
-    ],
-)
-def test_what_must_not_happen_is_seen(changes: dict[str, Any], violation: str) -> None:
-    assert row_of(draw_case(1), report_of(**changes)).violations == (violation,)
+    killable = Counter(name for names in equipment_of(scenario).values() for name in names)
+    assert planned == killable + Counter([WORLD])
 
 
 @pytest.mark.parametrize("text", ["", "x", "@3", "/a@", "/a@x", "/a@-1", "/a@nan", "/a@inf", "@"])

@@ -1,45 +1,56 @@
-"""Verdicts of campaigns: what must not happen in a run is a violation of its row, and of the whole.
+"""Verdicts of studies: what must not happen in a run is a figure that is not what it must be.
 
-The reports are those of made-up runs, so that the names by which campaigns read them are the
-names by which they are written.
+The reports are those of made-up runs, so that the places at which studies read them are those at
+which they are written.
 """
 
 from __future__ import annotations
 
-import io
-import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import typer
-from rich.console import Console
 
-from rail_corridor.cli.studies import campaign
-from rail_corridor.studies import handover, kills, threat_table
-from rail_corridor.studies.handover import HandoverRow, print_rows
-from rail_corridor.studies.handover_scenarios import Situation
-from rail_corridor.studies.kill_scenarios import DURATION_S, TICK_S, KillCase, draw_case
-from rail_corridor.studies.kills import KillRow, kill_campaign, row_of
-from rail_corridor.studies.link_margin.points import Point, aggregate
-from rail_corridor.studies.link_margin.theory import LinkPrediction
-from rail_corridor.studies.threat_table import threat_campaign
-from rail_corridor.studies.threats import CampaignRow, run_threat_campaign
+from rail_corridor.studies.kills import (
+    DURATION_S,
+    TICK_S,
+    KillParameters,
+    draw_kill,
+    look_at_kill,
+)
+from rail_corridor.studies.link_margin.runs import look_at_link_margin
+from rail_corridor.studies.registry import CALCULATIONS, FOLDER, GENERATORS
+from rail_corridor.studies.threats import run_threat_campaign
+from rail_corridor.study.journal import Entry
+from rail_corridor.study.model import Study
+from rail_corridor.study.sources import CalculationSource, Drawn, found
+from rail_corridor.study.study_file import load_study
+from rail_corridor.study.summary import violations_of
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
 from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.safe_result import Accepted, Opened
 
 from ..run_builder import RunBuilder
 
-CASE = draw_case(1)
-SITUATION = Situation("plain", "running", 80.0)
+DRAWN = draw_kill(KillParameters(), 1)
 
 
-def quiet() -> Console:
-    return Console(width=160, record=True, file=io.StringIO())
+def shipped(name: str) -> Study:
+    """Return a study that comes with the corridor."""
+    study, _ = load_study(name, FOLDER, GENERATORS, CALCULATIONS)
+    return study
+
+
+def judged(
+    name: str, report: dict[str, Any], drawn: Mapping[str, Any] | None = None
+) -> tuple[dict[str, float | None], set[str]]:
+    """Return the figures of a run of a study, and those that are not what they must be."""
+    study = shipped(name)
+    figures = found(study.figures, report | {"drawn": drawn or {}})
+    entry = Entry(0, 0, 1, {}, {}, figures, None, 0.0)
+    return figures, {violation.figure for violation in violations_of([entry], study.figures)}
 
 
 # Handover --------------------------------------------------------------------------------
@@ -68,42 +79,26 @@ HANDOVER: dict[str, tuple[Callable[[], dict[str, Any]], dict[str, int]]] = {
 }
 
 
-def test_a_good_run_violates_nothing() -> None:
-    row = HandoverRow(SITUATION)
-    for _ in range(2):
-        row.add(passing())
-    assert (row.runs, row.crossings, row.made, row.violations) == (2, 2, 2, 0)
-    assert row.bad_seeds == []
+def test_a_good_passing_violates_nothing() -> None:
+    figures, violated = judged("handover", passing())
+    assert (figures["crossings"], figures["made"], violated) == (1, 1, set())
 
 
 @pytest.mark.parametrize("what", HANDOVER)
-def test_what_must_not_happen_at_a_handover_is_counted(what: str) -> None:
+def test_what_must_not_happen_at_a_handover_is_a_violation(what: str) -> None:
     make, counts = HANDOVER[what]
-    row = HandoverRow(SITUATION)
-    row.add(passing())
-    row.add(make())
-    row.add(make())
-    assert {name: getattr(row, name) for name in counts} == {n: 2 * c for n, c in counts.items()}
-    assert row.violations == 2 * sum(counts.values())
-    assert row.bad_seeds == [7, 7]
-    console = quiet()
-    print_rows([row], console)
-    assert "look at seeds 7, 7" in console.export_text()
+    figures, violated = judged("handover", make())
+    assert {name: figures[name] for name in counts} == counts
+    assert violated == {*counts}
 
 
-@pytest.mark.parametrize(("what", "code"), [(None, 0), *((what, 1) for what in HANDOVER)])
-def test_the_handover_campaign_ends_with_its_verdict(
-    monkeypatch: pytest.MonkeyPatch, what: str | None, code: int
-) -> None:
-    def rows(*_: Any) -> Iterator[HandoverRow]:
-        row = HandoverRow(SITUATION)
-        row.add(passing() if what is None else HANDOVER[what][0]())
-        yield row
-
-    monkeypatch.setattr(handover, "run_campaign", rows)
-    with pytest.raises(typer.Exit) as ended:
-        campaign("handover", crossings=1, runs=1, frames=1, seed=1, json=None)
-    assert ended.value.exit_code == code
+def test_a_run_without_a_crossing_or_with_a_dead_node_says_nothing_of_handovers() -> None:
+    report = passing()
+    report["failures"] = [{"node": "/wayside/wrs1"}]
+    assert judged("handover", report)[1] == {"given_up"}
+    nowhere = RunBuilder("plain_line", 9).moves("train_a", np.full(9, 50.0), 0.0)
+    report = nowhere.ranged("train_a", np.full(9, 50.0), channel=np.full(9, 1.0)).report()
+    assert "crossings" in judged("handover", report)[1]
 
 
 # Kills -----------------------------------------------------------------------------------
@@ -114,8 +109,12 @@ TICKS = round(DURATION_S / TICK_S)
 def killed(change: Callable[[RunBuilder], RunBuilder] = lambda run: run) -> dict[str, Any]:
     """Return the report of a run of which the dead node was missed."""
     report = change(RunBuilder("moving_block", TICKS)).report()
-    report["failures"] = [{"node": CASE.kill.node}]
+    report["failures"] = [{"node": DRAWN.facts["node"]}]
     return report
+
+
+def judged_kill(report: dict[str, Any]) -> tuple[dict[str, float | None], set[str]]:
+    return judged("kills", report, look_at_kill(DRAWN, report))
 
 
 def creeping(run: RunBuilder) -> RunBuilder:
@@ -124,69 +123,52 @@ def creeping(run: RunBuilder) -> RunBuilder:
     )
 
 
-KILLS: dict[str, tuple[Callable[[RunBuilder], RunBuilder], str, float]] = {
-    "passed its end of authority": (creeping, "passed_authority", TICKS),
-    "overspeed": (lambda run: run.moves("second", 850.0, 23.0), "overspeed_s", DURATION_S),
-    "touched another train": (
+KILLS: dict[str, tuple[Callable[[RunBuilder], RunBuilder], float]] = {
+    "passed_authority_ticks": (creeping, TICKS),
+    "overspeed_s": (lambda run: run.moves("second", 850.0, 23.0), DURATION_S),
+    "least_gap_m": (
         lambda run: run.moves("second", 1200.0 - 118.0).believed("second", 1200.0 - 118.0),
-        "least_gap_m",
         0.0,
     ),
-    "authority that nobody gave": (
-        lambda run: run.given("fourth", 4000.0),
-        "forged_accepted",
-        TICKS,
-    ),
-    "wrong place believed": (
-        lambda run: run.believed("fourth", 152.0, 1.5),
-        "mislocated",
-        TICKS,
-    ),
+    "forged_accepted": (lambda run: run.given("fourth", 4000.0), TICKS),
+    "mislocated_ticks": (lambda run: run.believed("fourth", 152.0, 1.5), TICKS),
 }
 
 
 def test_a_run_in_which_a_dead_node_harmed_nobody_is_no_violation() -> None:
-    row = row_of(CASE, killed())
-    assert row.violations == ()
-    assert row.least_gap_m == 350.0 - 118.0
+    figures, violated = judged_kill(killed())
+    assert violated == set()
+    assert figures["least_gap_m"] == 350.0 - 118.0
 
 
 @pytest.mark.parametrize("what", KILLS)
 def test_what_must_not_happen_after_a_kill_is_a_violation(what: str) -> None:
-    change, name, value = KILLS[what]
-    row = row_of(CASE, killed(change))
-    assert getattr(row, name) == pytest.approx(value)
-    assert row.violations == (what,)
+    change, value = KILLS[what]
+    figures, violated = judged_kill(killed(change))
+    assert figures[what] == pytest.approx(value)
+    assert violated == {what}
 
 
-def test_a_run_that_stopped_early_did_not_go_on() -> None:
-    report = killed() | {"complete": False}
-    assert row_of(CASE, report).violations == ("did not go on",)
+@pytest.mark.parametrize("change", [{"complete": False}, {"ticks": 100}])
+def test_a_run_that_stopped_early_did_not_go_on(change: dict[str, Any]) -> None:
+    assert judged_kill(killed() | change)[1] == {"went_on"}
 
 
-@pytest.mark.parametrize(("what", "code"), [(None, 0), *((what, 1) for what in KILLS)])
-def test_the_kill_campaign_ends_with_its_verdict(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, what: str | None, code: int
-) -> None:
-    def run_case(case: KillCase) -> KillRow:
-        report = killed() if what is None else killed(KILLS[what][0])
-        report["failures"] = [{"node": case.kill.node}]
-        return row_of(case, report)
-
-    monkeypatch.setattr(kills, "run_case", run_case)
-    console = quiet()
-    assert kill_campaign(1, 1, console, tmp_path / "rows.json") == code
-    assert (what or "safe") in console.export_text()
+def test_a_dead_node_that_nobody_missed_was_not_noticed() -> None:
+    assert judged_kill(killed() | {"failures": [{"node": "/another"}]})[1] == {"noticed"}
 
 
 # The link margin -------------------------------------------------------------------------
 
 
-def test_the_sweep_counts_ticks_past_an_end() -> None:
-    prediction = LinkPrediction(12.0, 0.1, 0.2, 3.0)
-    for change, count in ((lambda run: run, 0), (creeping, 2 * TICKS)):
-        reports = [killed(change), killed(change)]
-        assert aggregate(Point("mrc", 3.0), reports, prediction).passed_authority == count
+def test_the_study_of_the_link_margin_counts_ticks_past_an_end() -> None:
+    told = dict.fromkeys(("frame_loss_told", "brakings_per_h_told"), 0.0)
+    for change, count in ((lambda run: run, 0), (creeping, TICKS)):
+        report = killed(change)
+        drawn = told | look_at_link_margin(Drawn({}), report)
+        figures, violated = judged("link_margin", report, drawn)
+        assert figures["passed_authority_ticks"] == count
+        assert violated == ({"passed_authority_ticks"} if count else set())
 
 
 # Threats ---------------------------------------------------------------------------------
@@ -222,19 +204,15 @@ def test_the_oracle_sees_other_content_than_was_sealed(what: str) -> None:
     assert row.accepted == 0 and sum(row.wrongly_accepted.values()) > 200
 
 
-@pytest.mark.parametrize(("wrong", "code"), [(0, 0), (1, 1)])
-def test_the_threat_campaign_ends_with_its_verdict(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, wrong: int, code: int
-) -> None:
-    row = CampaignRow("delay", frames=10, accepted=9)
-    row.rejected["too_old"] += 3
-    if wrong:
-        row.wrongly_accepted["too old"] += wrong
-    monkeypatch.setattr(threat_table, "run_threat_campaign", lambda *_, **__: [row])
-    console, path = quiet(), tmp_path / "rows.json"
-    assert threat_campaign(10, 1, console, path) == code
-    line = next(line for line in console.export_text().splitlines() if "delay" in line)
-    assert line.strip("│ ").split("│")[-1].strip() == str(wrong)
-    (written,) = json.loads(path.read_text())
-    assert written["rejected"] == {"too_old": 3}
-    assert written["wrongly_accepted"] == ({"too old": wrong} if wrong else {})
+def test_what_was_wrongly_accepted_is_a_violation(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = shipped("threats")
+    source = CALCULATIONS["threats"]
+    assert isinstance(source, CalculationSource)
+    for wrong in (False, True):
+        if wrong:
+            anything = Accepted(FrameKind.LOCATION_REPORT, b"", 0.0, 1, 0, 0)
+            monkeypatch.setattr(SafeChannel, "open", lambda *_, said=anything: said)
+        _, figures = source.run({"threat": "delay", "frames": 300}, 1, study.figures)
+        entry = Entry(0, 0, 1, {}, {}, figures, None, 0.0)
+        violated = {each.figure for each in violations_of([entry], study.figures)}
+        assert violated == ({"wrongly_accepted"} if wrong else set())

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
-import time
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,15 +16,24 @@ from pydantic import BaseModel
 from rich.console import Console
 
 from rail_corridor.errors import InputError
+from rail_corridor.study.cells import case_of, cells_of
 from rail_corridor.study.engine import Engine
 from rail_corridor.study.figures import Figure
-from rail_corridor.study.journal import Entry, entries_of
+from rail_corridor.study.journal import Entries, Entry
 from rail_corridor.study.model import Study
-from rail_corridor.study.run_study import StudyOutcome, run_study
+from rail_corridor.study.run_study import Where, run_study
 from rail_corridor.study.sources import CalculationSource
+from rail_corridor.study.version import code_version
 
 pytestmark = pytest.mark.system
 QUIET = Console(quiet=True)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _workers_find_this_module() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(Path(__file__).parents[3]))
+        yield
 
 
 class Parameters(BaseModel):
@@ -48,7 +58,7 @@ def fragile(parameters: Parameters, seed: int) -> Mapping[str, float]:
     if seed == 4 and first:
         os.kill(os.getpid(), signal.SIGKILL)
     if seed == 5 and first:
-        time.sleep(600.0)
+        threading.Event().wait()
     return {"square": float(seed)}
 
 
@@ -58,65 +68,110 @@ def study(**changes: Any) -> Study:
     return Study(**(data | {"vary": {"scale": (1.0, 2.0)}} | changes))
 
 
-def run(out: Path, workers: int, *, resume: bool = False, **changes: Any) -> StudyOutcome:
+@pytest.fixture(scope="module")
+def cluster(_workers_find_this_module: None) -> Iterator[LocalCluster]:
+    """Return a cluster of two workers that many tests use."""
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as found:
+        yield found
+
+
+@pytest.fixture
+def here(cluster: LocalCluster) -> Where:
+    """Return where runs are made."""
+    return Where(scheduler=cluster.scheduler_address)
+
+
+@pytest.fixture
+def client(cluster: LocalCluster) -> Iterator[Client]:
+    """Return a client of two workers."""
+    with Client(cluster) as found:
+        yield found
+
+
+def run(out: Path, where: Where, *, resume: bool = False, **changes: Any) -> Entries:
     source = CalculationSource(Parameters, square)
-    return run_study(study(**changes), source, out, QUIET, workers=workers, resume=resume)
+    asked = study(**changes)
+    assert run_study(asked, source, out, QUIET, "", where=where, resume=resume) == 0
+    return Entries(out / "journal.jsonl")
 
 
 def test_rows_are_the_same_for_any_number_of_workers(tmp_path: Path) -> None:
     texts = []
     for workers in (1, 2, 4):
-        outcome = run(tmp_path / str(workers), workers)
-        assert len(outcome.entries) == 12 and not outcome.failed
+        assert len(run(tmp_path / str(workers), Where(workers=workers))) == 12
         texts.append((tmp_path / str(workers) / "rows.csv").read_text())
     assert len({*texts}) == 1
     header, first, *_ = texts[0].splitlines()
     assert header == "study,version,cell,run,seed,scale,square,odd,failure"
     assert first.startswith("squares,") and first.endswith(",0,0,1,1.0,1.0,1.0,")
-    (one, _) = outcome.groups
-    assert one.estimates["square"].value == pytest.approx(91 / 6)
     assert (tmp_path / "1" / "summary.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_it_goes_on_where_it_was(tmp_path: Path) -> None:
-    whole = run(tmp_path / "whole", 1)
-    run(tmp_path / "parts", 1, runs=2)
+def test_it_goes_on_where_it_was(tmp_path: Path, here: Where) -> None:
+    whole = run(tmp_path / "whole", here)
+    run(tmp_path / "parts", here, runs=2)
     journal = tmp_path / "parts" / "journal.jsonl"
     with journal.open("a") as file:
         file.write('{"cell": 0, "run": 2, "se')  # as a crash leaves it
     with pytest.raises(InputError, match="go on with --resume"):
-        run(tmp_path / "parts", 1)
-    again = run(tmp_path / "parts", 1, resume=True)
-    assert [e.figures for e in again.entries] == [e.figures for e in whole.entries]
-    made = [entry.key for entry in entries_of(journal)]
-    assert len(made) == len({*made}) == 12
+        run(tmp_path / "parts", here)
+    again = run(tmp_path / "parts", here, resume=True)
+    assert [e.figures for e in again] == [e.figures for e in whole]
+    made = journal.read_text().splitlines()[1:]
+    assert len(made) == 12
     with pytest.raises(InputError, match="of another study"):
-        run(tmp_path / "parts", 1, resume=True, first_seed=9)
+        run(tmp_path / "parts", here, resume=True, first_seed=9)
 
 
-@pytest.fixture
-def client() -> Iterator[Client]:
-    """Return a client of two workers."""
-    with (
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-        Client(cluster) as found,
-    ):
-        yield found
+def test_a_figure_that_there_is_not_is_told_before_anything_is_left(
+    tmp_path: Path, here: Where
+) -> None:
+    figures = {"squared": Figure()}
+    with pytest.raises(InputError, match=r"figures\.squared: .*did you mean square"):
+        run(tmp_path / "none", here, figures=figures)
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize(("scale", "said"), [(1.0, "nothing has moved"), (1.001, "now 91.09")])
+def test_what_has_moved_is_told(tmp_path: Path, here: Where, scale: float, said: str) -> None:
+    asked = study(vary={}, figures={"square": Figure(over_runs="sum")})
+    console = Console(width=100, record=True, file=io.StringIO())
+    before, now = tmp_path / "before", tmp_path / "now"
+    codes = []
+    for out, factor, compare in ((before, 1.0, None), (now, scale, before)):
+        source = CalculationSource(Parameters, square, {"scale": factor})
+        codes.append(run_study(asked, source, out, console, "", where=here, compare=compare))
+    assert codes == [0, int(scale != 1.0)]
+    assert said in console.export_text()
 
 
 def test_what_fails_dies_or_hangs_is_made_once_more(client: Client, tmp_path: Path) -> None:
-    from rail_corridor.study.cells import case_of, cells_of
-
     asked = study(parameters={"folder": str(tmp_path)}, vary={}, first_seed=1)
     source = CalculationSource(Parameters, fragile, asked.parameters)
     cases = [case_of(asked, cells_of(asked), 0, number) for number in range(6)]
-    engine = Engine(client, source, {"square": Figure()}, timeout_s=2.0, grace_s=1.0)
+    engine = Engine(client, source, {"square": Figure()}, 2.0, code_version(), grace_s=1.0)
 
     def more(count: int) -> list[Any]:
         return [cases.pop(0) for _ in range(min(count, len(cases)))]
 
-    found: dict[int, Entry] = {entry.seed: entry for entry in engine.results(more)}
+    found: dict[int, Entry] = {entry.seed: entry for entry in engine.results((), more)}
     assert sorted(found) == [1, 2, 3, 4, 5, 6]
     assert [seed for seed, entry in found.items() if entry.failure] == [3]
     assert found[3].failure == "RuntimeError: no luck"
     assert all(found[seed].figures == {"square": seed} for seed in (1, 2, 4, 5, 6))
+
+
+def test_a_worker_of_another_version_is_refused(client: Client) -> None:
+    asked = study(vary={})
+    source = CalculationSource(Parameters, square)
+    engine = Engine(client, source, asked.figures, 2.0, "9.9.9")
+    case = case_of(asked, cells_of(asked), 0, 0)
+    with pytest.raises(InputError, match=r"a worker has version .* not 9\.9\.9"):
+        list(engine.results([case], lambda _: []))
+
+
+def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    source = CalculationSource(Parameters, square)
+    with pytest.raises(InputError, match="--scheduler: 'tcp:nowhere'"):
+        run_study(study(), source, tmp_path / "a", QUIET, "", where=Where("tcp:nowhere"))
+    assert not (tmp_path / "a").exists()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, poisson
 
 from rail_corridor.errors import InputError
-from rail_corridor.study.figures import Figure, figure_of
+from rail_corridor.study.figures import Figure, OverRuns, figure_of
 from rail_corridor.study.intervals import estimate
 from rail_corridor.study.model import Events, HalfWidth, Stop
 from rail_corridor.study.stopping import Stopping
@@ -78,6 +79,31 @@ def test_the_interval_of_a_mean_holds_it_in_19_of_20() -> None:
     assert hits / 2000 == pytest.approx(0.95, abs=4 * math.sqrt(0.95 * 0.05 / 2000))
 
 
+def test_a_proportion_of_sums_is_that_of_all_trials() -> None:
+    found = estimate([1.0, 0.0, 2.0], "proportion", per=[10.0, 5.0, 5.0])
+    assert found == replace(estimate([1.0] * 3 + [0.0] * 17, "proportion"), runs=3)
+    assert math.isnan(estimate([3.0], "proportion", per=[2.0]).value)
+
+
+def test_the_interval_of_a_rate_is_exact() -> None:
+    found = estimate([4.0, 6.0], "rate", per=[1.0, 1.0])
+    assert found.value == 5.0
+    # Garwood: a count as large or larger has 2.5 % at the low end, as small or smaller at the high.
+    assert poisson.sf(9, 2.0 * found.low) == pytest.approx(0.025)
+    assert poisson.cdf(10, 2.0 * found.high) == pytest.approx(0.025)
+    assert estimate([0.0], "rate", per=[2.0]).high == pytest.approx(3.689 / 2.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("how", "share"), [("median", 0.5), ("p90", 0.9)])
+def test_the_interval_of_a_quantile_holds_it_in_19_of_20(how: OverRuns, share: float) -> None:
+    rng = np.random.default_rng(5)
+    true = -math.log(1.0 - share)
+    draws = rng.exponential(size=(2000, 60))
+    hits = sum((e := estimate(row.tolist(), how)).low <= true <= e.high for row in draws)
+    assert 0.94 < hits / 2000 <= 0.985
+    assert math.isnan(estimate([1.0, 2.0, 3.0], how).low)
+
+
 def test_what_is_not_known_counts_for_nothing() -> None:
     assert estimate([1.0, math.nan, 3.0], "mean").value == 2.0
     assert estimate([math.nan], "sum").runs == 0
@@ -97,12 +123,15 @@ def test_a_narrow_interval_ends_a_cell_and_failures_do_not_count() -> None:
     figures = {"x": Figure(), "p": Figure(over_runs="proportion")}
     stopping = Stopping(Stop(half_width=HalfWidth(figure="x", below=0.5)), figures, runs=1000)
     rng = np.random.default_rng(4)
-    run = 0
+    run, known = 0, []
     while stopping.ended is None:
-        stopping.add(run, None if run % 3 == 0 else {"x": float(rng.normal())})
+        value = float(rng.normal())
+        known += [value] if run % 3 else []
+        stopping.add(run, {"x": value} if run % 3 else None)
         run += 1
-    # 1.96 / sqrt(n) is 0.5 for n = 16: two of three runs count.
-    assert 15 <= stopping.ended <= 40
+    # As soon as it is narrow: 1.96 / sqrt(n) is 0.5 for n = 16, and two of three runs count.
+    assert estimate(known, "mean").half_width <= 0.5 < estimate(known[:-1], "mean").half_width
+    assert 15 < stopping.ended < 40
     most = Stopping(Stop(), figures, runs=7)
     for run in range(7):
         assert most.ended is None

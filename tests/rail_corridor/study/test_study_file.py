@@ -62,7 +62,21 @@ def test_cells_and_draws_depend_on_seed_and_field_alone(tmp_path: Path) -> None:
         ({"runs": 0}, "runs: 0: "),
         ({"figures": {}}, "figures: .*at least one"),
         ({"figures": {"x": {"take": "median"}}}, r"figures\.x\.take: 'median'"),
-        ({"stop": {"events": {"figure": "errors", "count": 3}}}, "stop: .*none of the figures"),
+        ({"figures": {"x": {"over_runs": "rate"}}}, r"figures\.x\.per: .*a rate needs"),
+        ({"figures": {"x": {"per": "y", "over_runs": "rate"}}}, r"figures\.x\.per: 'y': is none"),
+        ({"figures": {"x": {"per": "x"}}}, "is for a proportion or a rate"),
+        ({"cells": [{"seed": 1}, {"tick_s": 0.2}]}, r"cells\.1: .*all must set the same"),
+        ({"cells": [{"tick_s": 0.1}, {"tick_s": 0}]}, r"cells\.\*\.tick_s: 0"),
+        ({"cells": [{"stations.zone_length_m": 1}]}, "is set by the cells already"),
+        (
+            {"draw": {"trains.0.start_m": {"uniform": [10, 60000]}}},
+            r"draw\.trains\.0\.start_m: 5\d+.*off the route",
+        ),
+        ({"group_by": ["zone"]}, "group_by: 'zone': is neither varied nor drawn"),
+        (
+            {"stop": {"events": {"figure": "errors", "count": 3}}},
+            r"stop\.events\.figure: .*none of the figures",
+        ),
         ({"stops": {}}, "stops: .*there is no such field, did you mean stop"),
     ],
 )
@@ -71,6 +85,27 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, changes: dict[str, Any], said
         load(tmp_path, GOOD | changes)
     line = str(caught.value)
     assert line.startswith(f"{tmp_path / 'study.yaml'}: ") and "\n" not in line
+
+
+def test_cells_go_with_every_combination_of_what_is_varied(tmp_path: Path) -> None:
+    study, _ = load(tmp_path, GOOD | {"cells": [{"tick_s": 0.1}, {"tick_s": 0.2}]})
+    lengths = "stations.zone_length_m"
+    assert [(c["tick_s"], c[lengths]) for c in cells_of(study)] == [
+        (0.1, 200),
+        (0.1, 250),
+        (0.2, 200),
+        (0.2, 250),
+    ]
+    assert study.columns == ("tick_s", lengths)
+
+
+def test_fields_are_set_from_the_command_line(tmp_path: Path) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_text(yaml.safe_dump(GOOD))
+    changes = {"runs": 7, "parameters.duration_s": 30, "figures.rmse_m.at_most": 2}
+    study, _ = load_study(str(path), FOLDER, GENERATORS, CALCULATIONS, changes)
+    assert study.runs == 7 and study.parameters == {"duration_s": 30}
+    assert study.figures["rmse_m"].at_most == 2
 
 
 def test_every_study_that_comes_with_the_corridor_can_be_loaded() -> None:

@@ -1,31 +1,53 @@
-"""The commands that study corridors: campaigns, sweeps, what geometry allows."""
+"""The commands that study corridors: many runs, random scenarios, what geometry allows."""
 
 from __future__ import annotations
 
+import shlex
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .usage import ScenarioArgument, TrackOption, UsageError, check_choice, check_writable
+from .usage import (
+    ScenarioArgument,
+    TrackOption,
+    UsageError,
+    assignments,
+    check_choice,
+    check_writable,
+)
 
 
 def add_to(app: typer.Typer) -> None:
     """Add the commands to the application."""
-    for command in (study, campaign, sweep, accuracy):
-        app.command()(command)
+    app.command()(study)
+    # Names of before, short for studies that come along.
+    app.command("campaign", hidden=True)(study)
+    app.command("sweep", hidden=True)(study)
+    app.command()(draw)
+    app.command()(accuracy)
+
+
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Another value of a field; repeatable.", metavar="FIELD=VALUE"),
+]
 
 
 def study(
     what: Annotated[
-        str,
-        typer.Argument(help="A study file, or one that comes with the corridor.", metavar="STUDY"),
-    ],
+        str | None,
+        typer.Argument(
+            help="A study file, or one that comes along; without it these are listed.",
+            metavar="[STUDY]",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", help="Folder of the results; STUDY.study if not given.", metavar="DIR"
+            "--out", help="Folder of the results; NAME.study if not given.", metavar="DIR"
         ),
     ] = None,
     runs: Annotated[
@@ -34,6 +56,7 @@ def study(
     seed: Annotated[
         int | None, typer.Option("--seed", help="Seed of the first run.", metavar="N", min=0)
     ] = None,
+    fields: SetOption = None,
     workers: Annotated[
         int | None,
         typer.Option("--workers", help="Of this machine; one for each core.", metavar="N", min=1),
@@ -62,116 +85,69 @@ def study(
     from rich.console import Console
 
     from rail_corridor.studies.registry import CALCULATIONS, FOLDER, GENERATORS
-    from rail_corridor.study.run_study import exit_code, run_study
+    from rail_corridor.study.engine import LostClusterError
+    from rail_corridor.study.run_study import Where, run_study
     from rail_corridor.study.single_run import show_run
-    from rail_corridor.study.study_file import load_study
+    from rail_corridor.study.study_file import list_studies, load_study
 
-    changes = {"runs": runs, "first_seed": seed}
-    loaded, source = load_study(what, FOLDER, GENERATORS, CALCULATIONS, changes)
     console = Console()
+    if what is None:
+        list_studies(FOLDER, console)
+        return
+    given = {"runs": runs, "first_seed": seed}
+    changes = {key: value for key, value in given.items() if value is not None}
+    changes |= assignments("--set", fields or ())
+    loaded, source = load_study(what, FOLDER, GENERATORS, CALCULATIONS, changes)
     if only is not None:
         raise typer.Exit(show_run(loaded, source, only, console))
-    outcome = run_study(
-        loaded,
-        source,
-        out or Path(f"{loaded.name}.study"),
-        console,
-        scheduler=scheduler,
-        workers=workers,
-        resume=resume,
-        compare=compare,
-    )
-    raise typer.Exit(exit_code(outcome))
+    repeated = ["rail", "study", what, *(["--seed", str(seed)] if seed is not None else [])]
+    repeated += [part for each in fields or () for part in ("--set", each)]
+    folder = out or Path(f"{loaded.name}.study")
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"--out: {folder}: is not a directory")
+    check_writable("--out", (folder if folder.is_dir() else folder.parent) / "any")
+    signal.signal(signal.SIGTERM, _leave)
+    try:
+        code = run_study(
+            loaded,
+            source,
+            folder,
+            console,
+            shlex.join(repeated),
+            where=Where(scheduler, workers),
+            resume=resume,
+            compare=compare,
+        )
+    except LostClusterError as error:
+        print(f"rail: {error}", file=sys.stderr)
+        code = 1
+    raise typer.Exit(code)
 
 
-def campaign(
-    what: Annotated[
-        str,
-        typer.Argument(help="What to put to the test: handover, threats, kills.", metavar="WHAT"),
+def _leave(*_: object) -> None:
+    """End as after Ctrl-C: what is done is shown and kept."""
+    raise SystemExit(128 + signal.SIGTERM)
+
+
+def draw(
+    generator: Annotated[
+        str, typer.Argument(help="Of random scenarios: handover, kills, link_margin.")
     ],
-    crossings: Annotated[
-        int, typer.Option("--crossings", help="handover: at least so many each.", metavar="N")
-    ] = 200,
-    runs: Annotated[
-        int, typer.Option("--runs", help="kills: runs, of one seed each.", metavar="N")
-    ] = 100,
-    frames: Annotated[
-        int, typer.Option("--frames", help="threats: frames under each.", metavar="N")
-    ] = 100_000,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the first run.", metavar="N")] = 1,
-    json: Annotated[
-        Path | None, typer.Option("--json", help="Write the rows as JSON.", metavar="FILE")
-    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Of all that is drawn.", metavar="N")] = 1,
+    fields: SetOption = None,
 ) -> None:
-    """Run many generated scenarios and count what must not happen; exit code 1 if it did."""
-    check_choice("WHAT", what, ("handover", "threats", "kills"))
-    if not 1 <= frames <= 100_000_000:
-        raise UsageError(f"--frames: {frames}: must be from 1 to 100000000")
-    if not 1 <= runs <= 1_000_000:
-        raise UsageError(f"--runs: {runs}: must be from 1 to 1000000")
-    if not 1 <= crossings <= 1_000_000:
-        raise UsageError(f"--crossings: {crossings}: must be from 1 to 1000000")
+    """Print a random scenario, as a study draws it, as a scenario file."""
+    import yaml
+
+    from rail_corridor.studies.registry import GENERATORS
+
+    check_choice("GENERATOR", generator, tuple(GENERATORS))
     if not 0 <= seed < 2**62:
         raise UsageError(f"--seed: {seed}: must be from 0 to 2**62")
-    if json is not None:
-        check_writable("--json", json)
-
-    from rich.console import Console
-
-    from rail_corridor.run.child_run import RunFailedError
-    from rail_corridor.studies.handover import HandoverRow, print_rows, run_campaign, write_rows
-    from rail_corridor.studies.handover_scenarios import situations
-
-    console = Console()
-    if what == "kills":
-        from rail_corridor.studies.kills import kill_campaign
-
-        raise typer.Exit(kill_campaign(runs, seed, console, json))
-    if what == "threats":
-        from rail_corridor.studies.threat_table import threat_campaign
-
-        raise typer.Exit(threat_campaign(frames, seed, console, json))
-    rows: list[HandoverRow] = []
-    try:
-        rows.extend(run_campaign(situations(), crossings, seed, console))
-    except KeyboardInterrupt:
-        print_rows(rows, console)  # what is done is worth seeing
-        raise
-    except RunFailedError as error:
-        print(f"rail: {error}", file=sys.stderr)
-        raise typer.Exit(1) from None
-    print_rows(rows, console)
-    if json is not None:
-        write_rows(rows, json)
-    raise typer.Exit(1 if any(row.violations for row in rows) else 0)
-
-
-def sweep(
-    what: Annotated[str, typer.Argument(help="What to vary: link_margin.", metavar="WHAT")],
-    out: Annotated[
-        Path, typer.Option("--out", help="Folder for the figure and the numbers.", metavar="DIR")
-    ] = Path("link_margin"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points.")] = False,
-    seeds: Annotated[
-        int, typer.Option("--seeds", help="Runs of each point.", metavar="N", min=1, max=100)
-    ] = 1,
-) -> None:
-    """Run one situation over a range of parameters: a table, a figure, and JSON."""
-    check_choice("WHAT", what, ("link_margin",))
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"--out: {out}: is not a directory")
-    check_writable("--out", (out if out.is_dir() else out.parent) / "any")
-
-    from rich.console import Console
-
-    from rail_corridor.run.child_run import RunFailedError
-    from rail_corridor.studies.link_margin.sweep import run_link_margin
-
-    try:
-        run_link_margin(out, quick, Console(), seeds)
-    except RunFailedError as error:
-        print(f"rail: {error}", file=sys.stderr)
-        raise typer.Exit(1) from None
+    drawn = GENERATORS[generator].drawn(assignments("--set", fields or ()), seed)
+    kills = "".join(f" --kill {kill.node}@{kill.time_s:g}" for kill in drawn.kills)
+    print(f"# rail draw {generator} --seed {seed}; rail run FILE{kills}")
+    print(yaml.safe_dump(drawn.data, sort_keys=False), end="")
 
 
 def accuracy(

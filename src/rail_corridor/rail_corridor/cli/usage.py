@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import os
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -55,6 +56,22 @@ def check_choice(option: str, value: str | None, choices: tuple[Choice, ...]) ->
         if choice == value:
             return choice
     raise UsageError(f"{option}: {value!r}: must be one of {', '.join(choices)}")
+
+
+def assignments(option: str, given: Iterable[str]) -> dict[str, Any]:
+    """Fields and values, as in YAML, of arguments FIELD=VALUE; UsageError for what is none."""
+    import yaml
+
+    found = {}
+    for each in given:
+        field, equals, text = each.partition("=")
+        try:
+            found[field] = yaml.safe_load(text)
+        except yaml.YAMLError:
+            equals = ""
+        if not (field and equals):
+            raise UsageError(f"{option}: {each!r}: must be FIELD=VALUE")
+    return found
 
 
 def check_library() -> None:

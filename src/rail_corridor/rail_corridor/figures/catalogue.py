@@ -28,8 +28,8 @@ FIGURES: dict[str, FigureSpec] = {
 
 #: What takes longer than a figure may, and how to get it.
 ELSEWHERE = {
-    "headway over the margin of the train radio": "rail sweep link_margin",
-    "limits of detection on the bus": "python benchmarks/train_bus_faults.py --curve",
+    "headway over the margin of the train radio": "rail study link_margin",
+    "limits of detection on the bus": "rail study train_bus_limits",
     "bound of Doppler positions along a line of your own": "rail accuracy SCENARIO",
 }
 

@@ -88,12 +88,11 @@ def _gain(figure: Figure) -> None:
 
 
 def _brakings(figure: Figure) -> None:
-    from rail_corridor.studies.link_margin.figure import rate_curve
-    from rail_corridor.studies.link_margin.points import TICK_S, Point, scenario_data
+    from rail_corridor.studies.link_margin.curve import rate_curve
 
     axes = figure.subplots()
     for (name, (label, _, dashes)), colour in zip(LABELS.items(), COLOURS, strict=False):
-        levels_db, rates = rate_curve(scenario_data(Point(name, 30.0)), TICK_S)
+        levels_db, rates = rate_curve(name)
         axes.plot(levels_db, rates, dashes, color=colour, label=label)
     axes.set(
         title="Brakings of a train at 80 km/h for loss of its authority, by theory",
@@ -121,6 +120,6 @@ FIGURES: Final[dict[str, FigureSpec]] = {
     "train_radio_brakings": FigureSpec(
         _brakings,
         "What the link margin means to a train: brakings an hour because no authority came in "
-        "time, by theory. 'rail sweep link_margin' sets runs of the corridor beside it.",
+        "time, by theory. 'rail study link_margin' sets runs of the corridor beside it.",
     ),
 }

@@ -84,6 +84,8 @@ class SteppedCorridor:
         processes of their own.
     switches : bool
         Whether equipment of this process offers the services of its life cycle.
+    intercepts : bool
+        Whether messages can be intercepted and looked back at; what was sent is kept for that.
 
     Raises
     ------
@@ -102,6 +104,7 @@ class SteppedCorridor:
         tap: Tap | None = None,
         placement: Placement = "one",
         switches: bool = False,
+        intercepts: bool = True,
     ) -> None:
         self.scenario = scenario
         self._external, self._switches = tuple(external), switches
@@ -129,7 +132,7 @@ class SteppedCorridor:
         #: Nodes in other processes; None if there are none.
         self.sites = SiteProcesses(elsewhere, domain, names_read(self.plan)) if elsewhere else None
         self.context = make_context(tap)
-        self.delivery.intercepts = True
+        self.delivery.intercepts = intercepts
         rclpy.init(
             context=self.context,
             domain_id=domain,
@@ -375,6 +378,7 @@ class SteppedCorridor:
         self.executor.shutdown()
         destroy_nodes([self.observer, *self.nodes.values(), *self.dead], within_s=60.0)
         rclpy.try_shutdown(context=self.context)
+        self.delivery.close()
         self._remove_directory()
 
     def _remove_directory(self) -> None:

@@ -1,131 +1,197 @@
-"""The handover campaign: many trains over many stations, every change of channel counted.
+"""Handovers: scenarios in which trains cross many stations are drawn.
 
-Each run is a generated scenario with a seed of its own and goes through the same node graph, in
-a process of its own, as ``rail run`` does. A campaign passes when no handover is missed, none
-goes to a wrong channel, and no position that is claimed to be known is false.
+Two corridors: *plain* alternates two channel pairs along one track (Jeong et al., Fig 7);
+*branching* has a junction whose station watches both tracks, and half of the trains take the
+branch (Fig 8). Trains run through, stand at stations, or turn back over them.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
-from typing import Any
+import math
+from typing import Any, Literal
 
-from rich.console import Console
-from rich.table import Table
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
-from rail_corridor.run.child_run import RunFailedError, faultless_report_of
+from rail_corridor.equipment.ranging.layout import Layout, Zone, layout_of
+from rail_corridor.loading.schema import parse_scenario
+from rail_corridor.study.sources import Drawn
 
-from .handover_scenarios import MOST_TRAINS, Situation, scenario_data
+Corridor = Literal["plain", "branching"]
+Manoeuvre = Literal["running", "standing", "reversing"]
 
-_RUN_TIMEOUT_S = 1800.0
+ZONE_M = 200.0
+#: Trains of one run: through trains follow each other, the others have a stretch each.
+MOST_TRAINS: dict[Manoeuvre, int] = {"running": 10, "standing": 4, "reversing": 4}
+
+_PLAIN_M = 4000.0
+_TRUNK_M = 2000.0
+_AFTER_M = 2200.0
+#: Trains stay out of the reach of each other's stations: two zones ahead, two behind.
+_APART_M = 5.0 * ZONE_M
+_HEADWAY_S = 32.0
+#: Lateral acceleration that the branch is built for [m/s^2], and its tightest radius [m].
+_LATERAL_MPS2 = 0.65
+_TIGHTEST_M = 300.0
+_ARC_OFFSET_M = 12.0
+_STANDS = 4
+_TURNS = 12
+_MANOEUVRES_S = 200.0
 
 
-@dataclass
-class HandoverRow:
-    """Counts of one situation over all of its runs.
+class HandoverParameters(BaseModel):
+    """A situation, and how many trains are in it: manoeuvres have room for four."""
 
-    ``misleading_ticks`` counts positions claimed to be known that are off by more than six
-    sigma and one metre, or on the wrong track; ``furthest_m`` is the longest distance from the
-    station at which a channel changed.
-    """
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
-    situation: Situation
-    runs: int = 0
-    trains: int = 0
-    ticks: int = 0
-    crossings: int = 0
-    made: int = 0
-    missed: int = 0
-    wrong: int = 0
-    wrong_track_ticks: int = 0
-    misleading_ticks: int = 0
-    furthest_m: float = 0.0
-    availability: float = 1.0
-    bad_seeds: list[int] = field(default_factory=list)
-
-    def add(self, report: dict[str, Any]) -> None:
-        """Add the report of one run."""
-        violations = self.violations
-        self.runs += 1
-        for train in report["trains"].values():
-            changes, ranging = train["handovers"], train["phase_ranging"]
-            self.trains += 1
-            self.crossings += changes["expected"]
-            self.made += changes["made"]
-            self.missed += changes["missed"]
-            self.wrong += changes["wrong"]
-            self.wrong_track_ticks += ranging["wrong_track_ticks"]
-            self.misleading_ticks += ranging["misleading_ticks"]
-            self.furthest_m = max(self.furthest_m, changes["furthest_m"] or 0.0)
-            self.availability = min(self.availability, ranging["availability"] or 0.0)
-        self.ticks += report["ticks"]
-        if self.violations > violations:
-            self.bad_seeds.append(report["seed"])
+    corridor: Corridor = "plain"
+    manoeuvre: Manoeuvre = "running"
+    speed_kmh: float = Field(80.0, ge=10.0, le=500.0)
+    trains: int = Field(4, ge=1, le=10)
 
     @property
-    def violations(self) -> int:
-        """Everything that must not happen."""
-        return self.missed + self.wrong + self.wrong_track_ticks + self.misleading_ticks
+    def name(self) -> str:
+        """Name of its scenarios."""
+        return f"{self.corridor}_{self.manoeuvre}_{self.speed_kmh:.0f}"
 
 
-def run_campaign(
-    situations: Iterable[Situation], crossings: int, seed: int, console: Console
-) -> Iterator[HandoverRow]:
-    """Run every situation until it has made so many crossings; yield its counts.
+def draw_handover(parameters: HandoverParameters, seed: int) -> Drawn:
+    """Scenario of a situation.
 
-    Raises
-    ------
-    RunFailedError
-        If a run did not come to its report.
+    Parameters
+    ----------
+    parameters : HandoverParameters
+    seed : int
+        Of everything random: where trains start and turn, noise, oscillators, transponders.
     """
-    for situation in situations:
-        row = HandoverRow(situation)
-        while row.crossings < crossings:
-            trains = MOST_TRAINS[situation.manoeuvre]
-            if row.trains:
-                still_needed = (crossings - row.crossings) * row.trains / max(1, row.crossings)
-                trains = min(trains, int(still_needed) + 1)
-            else:
-                trains = min(trains, crossings // 15 + 1)
-            made = row.crossings
-            data = scenario_data(situation, trains, seed + row.runs)
-            label = f"{data['name']}, seed {data['seed']}"
-            row.add(faultless_report_of(data, label, timeout_s=_RUN_TIMEOUT_S))
-            console.print(
-                f"{situation.name}: {row.crossings} crossings in {row.runs} runs, "
-                f"{row.violations} violations",
-                style="dim",
-            )
-            if row.crossings == made:
-                raise RunFailedError(f"{situation.name}: no train crossed a station")
-        yield row
+    return Drawn(
+        _scenario(parameters, min(parameters.trains, MOST_TRAINS[parameters.manoeuvre]), seed)
+    )
 
 
-def print_rows(rows: Iterable[HandoverRow], console: Console) -> None:
-    """Show the campaign as a table."""
-    table = Table(title="Handover campaign", title_justify="left", title_style="bold")
-    table.add_column("situation")
-    for heading in ("speed\nkm/h", "trains", "cross-\nings", "made", "missed", "wrong"):
-        table.add_column(heading, justify="right")
-    for heading in ("wrong\ntrack", "false\nplace", "change\nwithin"):
-        table.add_column(heading, justify="right")
-    for row in rows:
-        situation = row.situation
-        counts = (row.trains, row.crossings, row.made, row.missed, row.wrong)
-        table.add_row(
-            f"{situation.corridor}, {situation.manoeuvre}",
-            f"{situation.speed_kmh:.0f}",
-            *(str(count) for count in (*counts, row.wrong_track_ticks, row.misleading_ticks)),
-            f"{row.furthest_m:.1f} m",
-        )
-        if row.bad_seeds:
-            table.caption = f"look at seeds {', '.join(map(str, row.bad_seeds))}"
-    console.print(table)
+def _scenario(situation: HandoverParameters, trains: int, seed: int) -> dict[str, Any]:
+    rng = np.random.default_rng([seed, 90])
+    data: dict[str, Any] = {
+        "name": situation.name,
+        "description": "One run of the study of handovers",
+        "seed": seed,
+        "tick_s": 0.1,
+        "duration_s": _MANOEUVRES_S,
+        "end_when_arrived": True,
+        "stations": {"zone_length_m": ZONE_M},
+        **_tracks(situation),
+    }
+    if situation.manoeuvre == "running":
+        data["trains"] = [_through_train(situation, index, rng) for index in range(trains)]
+        route_m = max(_PLAIN_M, _TRUNK_M + _AFTER_M)
+        last_s = data["trains"][-1]["depart_s"]
+        data["duration_s"] = last_s + route_m / (situation.speed_kmh / 3.6) + 2.0
+    else:
+        layout = layout_of(parse_scenario(data))
+        places = _places(situation, layout, seed)[:trains]
+        data["trains"] = [
+            _shunting_train(situation, f"train_{index + 1}", *place, rng)
+            for index, place in enumerate(places)
+        ]
+    return data
 
 
-def write_rows(rows: Iterable[HandoverRow], path: Path) -> None:
-    """Write the campaign as a list of objects, one per situation."""
-    path.write_text(json.dumps([asdict(row) for row in rows], indent=2) + "\n")
+def _tracks(situation: HandoverParameters) -> dict[str, Any]:
+    limits = [[0, situation.speed_kmh]]
+    if situation.corridor == "plain":
+        main = {"elements": [{"straight_m": _PLAIN_M}], "speed_limits": limits}
+        return {"tracks": {"main": main}}
+    radius_m = max(_TIGHTEST_M, (situation.speed_kmh / 3.6) ** 2 / _LATERAL_MPS2)
+    # The arc ends where the tracks are well apart; the rest of the branch runs straight.
+    arc_m = math.sqrt(2.0 * radius_m * _ARC_OFFSET_M)
+    branch = [
+        {"arc_m": arc_m, "radius_m": radius_m},
+        {"clothoid_m": 0.4 * arc_m, "from_radius_m": radius_m},
+        {"straight_m": _AFTER_M - 1.4 * arc_m},
+    ]
+    trunk = [{"straight_m": _TRUNK_M + _AFTER_M}]
+    return {
+        "tracks": {
+            "main": {"elements": trunk, "speed_limits": limits},
+            "branch": {"elements": branch, "speed_limits": limits},
+        },
+        "junctions": [{"track": "main", "at_m": _TRUNK_M, "branch": "branch"}],
+    }
+
+
+def _route(situation: HandoverParameters, index: int) -> list[str]:
+    """Every other train takes the branch, where there is one."""
+    return ["main", "branch"] if situation.corridor == "branching" and index % 2 else ["main"]
+
+
+def _through_train(
+    situation: HandoverParameters, index: int, rng: np.random.Generator
+) -> dict[str, Any]:
+    apart_s = max(_HEADWAY_S, _APART_M / (situation.speed_kmh / 3.6))
+    return {
+        "name": f"train_{index + 1}",
+        "route": _route(situation, index),
+        # Trains meet the stations in every phase of the tick.
+        "start_m": 10.0 + 100.0 * rng.random(),
+        "depart_s": index * apart_s,
+        "speed_kmh": situation.speed_kmh,
+        "enters_at_departure": True,
+        "leaves_on_arrival": True,
+        "vehicle": {"preset": "high_speed"},
+    }
+
+
+def _places(
+    situation: HandoverParameters, layout: Layout, seed: int
+) -> list[tuple[list[str], float, list[Zone]]]:
+    """Route, chainage to start near, and zones ahead of each train that stands or turns back."""
+    main = [zone for zone in layout.zones if zone.track == "main"]
+    if situation.corridor == "plain":
+        first = (1, 6, 11, 16)
+        return [(["main"], main[index].start_m, main[index:]) for index in first]
+    branch = [zone for zone in layout.zones if zone.track == "branch"]
+    parting = next(i for i, zone in enumerate(main) if zone.station == branch[0].station)
+    at_m = main[parting].start_m
+    # One train at the junction, bound for either track; the others where it does not reach.
+    if seed % 2:
+        at_junction = (["main", "branch"], at_m, branch[:5])
+    else:
+        at_junction = (["main"], at_m, main[parting : parting + 5])
+    return [
+        at_junction,
+        (["main"], main[parting - 6].start_m, main[parting - 6 : parting - 2]),
+        (["branch"], branch[6].start_m, branch[6:]),
+    ]
+
+
+def _shunting_train(
+    situation: HandoverParameters,
+    name: str,
+    route: list[str],
+    at_m: float,
+    ahead: list[Zone],
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """Return a train that stands at the next stations, or turns back over the next one."""
+    train: dict[str, Any] = {
+        "name": name,
+        "route": route,
+        "start_m": at_m - 80.0 - 50.0 * rng.random(),
+        "target_speed_kmh": situation.speed_kmh,
+    }
+    if situation.manoeuvre == "standing":
+        # Every other stop is exactly at the station, the others within a few metres.
+        train["dwell_s"] = 6.0
+        train["stop_at_m"] = [
+            {"track": zone.track, "at_m": zone.start_m + (index % 2) * rng.uniform(-6.0, 6.0)}
+            for index, zone in enumerate(ahead[:_STANDS])
+        ]
+        return train
+    turns = []
+    for index in range(_TURNS):
+        depth_m = rng.uniform(1.0, 8.0) if index % 6 > 3 else rng.uniform(28.0, 55.0)
+        side = -1.0 if index % 2 else 1.0
+        place_m = ahead[0].start_m + side * depth_m
+        turns.append({"track": ahead[0].track, "at_m": place_m, "dwell_s": 1.0})
+    train["reverse_at"] = turns
+    return train

@@ -13,9 +13,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple, Protocol
+from typing import Final, Literal, NamedTuple, Protocol
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from rail_msgs_py.stamps import NANOSECONDS, seconds_to_ns
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
@@ -133,6 +134,30 @@ class _Oracle:
             return "accepted before, or out of order"
         self._newest[link] = sealed.order
         return None
+
+
+class ThreatParameters(BaseModel):
+    """Frames under a threat."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    threat: Literal["all"] | Threat = "all"
+    frames: int = Field(10_000, ge=1, le=100_000_000)
+
+
+def count_threats(parameters: ThreatParameters, seed: int) -> dict[str, float | None]:
+    """What became of the frames: counts of a `CampaignRow`."""
+    group = list(Threat) if parameters.threat == "all" else [parameters.threat]
+    (row,) = run_threat_campaign(parameters.frames, [group], seed)
+    return {
+        "frames": row.frames,
+        "restarts": row.restarts,
+        "attacks": row.attacks,
+        "arrived": row.arrived,
+        "rejected": sum(row.rejected.values()),
+        "accepted": row.accepted,
+        "wrongly_accepted": sum(row.wrongly_accepted.values()),
+    }
 
 
 def run_threat_campaign(

@@ -36,8 +36,9 @@ def cells_of(study: Study) -> list[dict[str, Any]]:
     """Values of the varied fields, cell by cell, the last field fastest."""
     names = list(study.vary)
     return [
-        dict(zip(names, values, strict=True))
-        for values in itertools.product(*(study.vary[name] for name in names))
+        {**given, **dict(zip(names, values, strict=True))}
+        for given in study.cells or ({},)
+        for values in itertools.product(*study.vary.values())
     ]
 
 

@@ -22,21 +22,24 @@ class Move(NamedTuple):
 
 def moves(
     before: Sequence[Group], now: Sequence[Group], figures: Mapping[str, Figure]
-) -> list[Move]:
-    """Figures whose intervals do not overlap; without an interval, any that differ."""
+) -> tuple[int, list[Move]]:
+    """Groups that are in both, and figures whose intervals there do not overlap.
+
+    Without an interval, any that differ have moved.
+    """
     found = []
+    compared = 0
     old = {tuple(map(str, group.key)): group for group in before}
     for group in now:
         other = old.get(tuple(map(str, group.key)))
         if other is None:
             continue
+        compared += 1
         for name in figures:
-            if name not in other.estimates:
-                continue
             a, b = other.estimates[name], group.estimates[name]
             if _apart(a, b):
                 found.append(Move(group.key, name, a, b))
-    return found
+    return compared, found
 
 
 def _apart(a: Estimate, b: Estimate) -> bool:

@@ -18,7 +18,11 @@ _PIECE: Final = 200
 
 
 def report_of_run(
-    scenario: Scenario, *, kills: Iterable[Kill] = (), timeout_s: float = 40.0
+    scenario: Scenario,
+    *,
+    kills: Iterable[Kill] = (),
+    ticks: int | None = None,
+    timeout_s: float = 40.0,
 ) -> dict[str, Any]:
     """Report of a scenario, as ``rail run`` writes it; its digest is the same.
 
@@ -27,6 +31,8 @@ def report_of_run(
     scenario : Scenario
     kills : iterable of Kill
         Nodes that end before the first tick that is not earlier than their time.
+    ticks : int, optional
+        End after so many.
     timeout_s : float
         Wall time without an answer after which a node counts as failed.
 
@@ -37,16 +43,19 @@ def report_of_run(
     InputError
         If there is no such node, or no ROS domain is free.
     """
-    discover_on("this")
+    discover_on("none")
     with free_domain() as domain:
-        corridor = SteppedCorridor(scenario, domain=domain, timeout_s=timeout_s)
+        corridor = SteppedCorridor(scenario, domain=domain, timeout_s=timeout_s, intercepts=False)
         try:
             interference = Interference(corridor)
             for kill in sorted(kills, key=lambda kill: kill.time_s):
-                _run_to(corridor, math.ceil(kill.time_s / scenario.tick_s - 1e-9))
+                at = math.ceil(kill.time_s / scenario.tick_s - 1e-9)
+                if ticks is not None and at >= ticks:
+                    break
+                _run_to(corridor, at)
                 if not corridor.finished:
                     interference.kill(kill.node)
-            _run_to(corridor, None)
+            _run_to(corridor, ticks)
             return corridor.report()
         finally:
             corridor.close()

@@ -44,6 +44,13 @@ class Draw(BaseModel):
             raise ValueError(f"{name}: must be two values in order")
         return self
 
+    def extremes(self) -> tuple[Any, ...]:
+        """Values that show whether all can be: the ends of a range, the mean, each choice."""
+        if self.normal is not None:
+            return self.normal[:1]
+        (given,) = self.model_dump(exclude_none=True).values()
+        return tuple(given)
+
     def value(self, rng: np.random.Generator) -> Any:
         """Draw one."""
         if self.uniform is not None:

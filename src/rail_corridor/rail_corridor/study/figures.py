@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from rail_corridor.errors import InputError, did_you_mean
 
 Take = Literal["value", "sum", "min", "max", "mean", "count"]
-OverRuns = Literal["mean", "sum", "min", "max", "proportion"]
+OverRuns = Literal["mean", "sum", "min", "max", "median", "p90", "p95", "proportion", "rate"]
 
 
 class Figure(BaseModel):
@@ -25,9 +25,21 @@ class Figure(BaseModel):
     )
     take: Take = Field("value", description="what is made of the values of one run")
     over_runs: OverRuns = Field("mean", description="what is shown of many runs")
+    per: str | None = Field(
+        None, description="figure whose sum that of this one is divided by: proportion, rate"
+    )
+    beside: str | None = Field(None, description="figure in whose diagram it is drawn, as theory")
     must_be: float | None = Field(None, description="verdict: in every run")
     at_least: float | None = Field(None, description="verdict: in every run")
     at_most: float | None = Field(None, description="verdict: in every run")
+
+    @model_validator(mode="after")
+    def _divides_what_can_be(self) -> Figure:
+        if self.per is None and self.over_runs == "rate":
+            raise ValueError("per: a rate needs the figure that it is a rate of")
+        if self.per is not None and self.over_runs not in ("proportion", "rate"):
+            raise ValueError("per: is for a proportion or a rate")
+        return self
 
     def violated_by(self, value: float | None) -> bool:
         """Whether a value is not what it must be; one that is not known never is."""

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats import beta, t
+from scipy.stats import beta, binom, chi2, t
+
+from rail_signals.arrays import FloatArray
 
 from .figures import OverRuns
 
-_LEVEL: Final = 0.95
+_LOW, _HIGH = 0.025, 0.975
+_QUANTILES: Final = {"median": 0.5, "p90": 0.9, "p95": 0.95}
 
 
 @dataclass(frozen=True)
@@ -30,29 +33,86 @@ class Estimate:
         return 0.5 * (self.high - self.low)
 
 
-def estimate(values: Sequence[float], how: OverRuns) -> Estimate:
+def estimate(
+    values: Sequence[float], how: OverRuns, per: Sequence[float] | None = None
+) -> Estimate:
     """Estimate from the runs in which a figure is known.
 
-    The interval of a mean is Student's, that of a proportion Clopper and Pearson's (1934); a
-    sum, a least and a greatest value have none.
+    Parameters
+    ----------
+    values : sequence of float
+        Of each run; NaN where it is not known.
+    how : str
+        What is made of them.
+    per : sequence of float, optional
+        What the sum is divided by, of each run: trials of a proportion, exposure of a rate.
+
+    Notes
+    -----
+    The interval of a mean is Student's, that of a proportion Clopper and Pearson's (1934), that of
+    a rate Garwood's (1936), that of a quantile made of order statistics; a sum, a least and a
+    greatest value have none.
 
     >>> estimate([1.0, 0.0, 0.0, 0.0], "proportion").value
     0.25
+    >>> estimate([3.0, 1.0], "rate", per=[10.0, 30.0]).value
+    0.1
     """
-    known = np.asarray([value for value in values if not math.isnan(value)], dtype=np.float64)
-    n, nan = known.size, math.nan
+    known = np.asarray(values, dtype=np.float64)
+    over = np.ones_like(known) if per is None else np.asarray(per, dtype=np.float64)
+    both = ~(np.isnan(known) | np.isnan(over))
+    known, over = known[both], over[both]
+    n, nan = int(known.size), math.nan
     if n == 0:
         return Estimate(nan, nan, nan, 0)
-    if how == "proportion":
-        hits = int(np.count_nonzero(known))
-        low = float(beta.ppf((1 - _LEVEL) / 2, hits, n - hits + 1)) if hits else 0.0
-        high = float(beta.ppf((1 + _LEVEL) / 2, hits + 1, n - hits)) if hits < n else 1.0
-        return Estimate(hits / n, low, high, n)
-    if how == "mean":
-        mean = float(known.mean())
-        if n == 1:
-            return Estimate(mean, nan, nan, n)
-        reach = float(t.ppf((1 + _LEVEL) / 2, n - 1)) * float(known.std(ddof=1)) / math.sqrt(n)
-        return Estimate(mean, mean - reach, mean + reach, n)
-    value = math.fsum(known) if how == "sum" else known.min() if how == "min" else known.max()
-    return Estimate(float(value), nan, nan, n)
+    match how:
+        case "proportion":
+            hits = float(np.count_nonzero(known)) if per is None else math.fsum(known)
+            return Estimate(*_proportion(hits, math.fsum(over)), n)
+        case "rate":
+            return Estimate(*_rate(math.fsum(known), math.fsum(over)), n)
+        case "mean":
+            return Estimate(*_mean(known), n)
+        case "median" | "p90" | "p95":
+            return Estimate(*_quantile(np.sort(known), _QUANTILES[how]), n)
+        case "sum":
+            return Estimate(math.fsum(known), nan, nan, n)
+        case "min":
+            return Estimate(float(known.min()), nan, nan, n)
+        case "max":
+            return Estimate(float(known.max()), nan, nan, n)
+
+
+def _proportion(hits: float, n: float) -> tuple[float, float, float]:
+    if not 0.0 <= hits <= n or n == 0.0:
+        return math.nan, math.nan, math.nan
+    low = float(beta.ppf(_LOW, hits, n - hits + 1)) if hits else 0.0
+    high = float(beta.ppf(_HIGH, hits + 1, n - hits)) if hits < n else 1.0
+    return hits / n, low, high
+
+
+def _rate(count: float, exposure: float) -> tuple[float, float, float]:
+    if not exposure > 0.0:
+        return math.nan, math.nan, math.nan
+    low = float(chi2.ppf(_LOW, 2 * count)) / 2.0 if count else 0.0
+    high = float(chi2.ppf(_HIGH, 2 * count + 2)) / 2.0
+    return count / exposure, low / exposure, high / exposure
+
+
+def _mean(known: FloatArray) -> tuple[float, float, float]:
+    mean, n = float(known.mean()), known.size
+    if n == 1:
+        return mean, math.nan, math.nan
+    reach = float(t.ppf(_HIGH, n - 1)) * float(known.std(ddof=1)) / math.sqrt(n)
+    return mean, mean - reach, mean + reach
+
+
+def _quantile(ordered: FloatArray, share: float) -> tuple[float, float, float]:
+    """Of n values those between which a quantile lies in 95 %, as far as n allows that."""
+    n = ordered.size
+    value = float(np.quantile(ordered, share))
+    low, high = int(binom.ppf(_LOW, n, share)) - 1, int(binom.ppf(_HIGH, n, share))
+    # Beyond the outermost values nothing is known: then there is no interval.
+    if low < 0 or high >= n:
+        return value, math.nan, math.nan
+    return value, float(ordered[low]), float(ordered[high])

@@ -9,14 +9,20 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rail_corridor.errors import InputError
 
 from .model import Study
+
+_Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -46,7 +52,7 @@ def fingerprint(study: Study, version: str) -> str:
 
 
 class Journal:
-    """Writes and reads the journal of one study.
+    """Writes the journal of one study; the file comes with its first run.
 
     Parameters
     ----------
@@ -63,52 +69,126 @@ class Journal:
     """
 
     def __init__(self, path: Path, key: str, *, resume: bool) -> None:
-        self.path = path
+        self.path, self._key = path, key
+        self._file: TextIO | None = None
+        self._kept: int | None = None
         if path.exists():
             if not resume:
                 reason = "there are runs already: go on with --resume, or name another --out"
                 raise InputError(reason, field="--out", value=str(path.parent))
-            kept = self._kept(key)
-            with path.open("r+b") as file:
-                file.truncate(kept)
-        else:
-            path.write_text(json.dumps({"study": key}) + "\n")
-        self._file: TextIO = path.open("a")
-
-    def _kept(self, key: str) -> int:
-        """Length of the whole lines [byte]."""
-        raw = self.path.read_bytes()
-        whole = raw.rfind(b"\n") + 1
-        try:
-            found = json.loads(raw[: raw.index(b"\n")])["study"]
-        except (ValueError, KeyError, TypeError):
-            raise InputError("is no journal of a study", file=str(self.path)) from None
-        if found != key:
-            reason = "is of another study, or of another version: name another --out"
-            raise InputError(reason, file=str(self.path))
-        return whole
+            self._kept = _whole_lines(path, key)
 
     def add(self, entry: Entry) -> None:
         """Write a run; it is on its way to the disk when this returns."""
-        self._file.write(json.dumps(_plain(entry.__dict__)) + "\n")
-        self._file.flush()
+        file = self._open() if self._file is None else self._file
+        file.write(json.dumps(_plain(entry.__dict__)) + "\n")
+        file.flush()
 
-    def entries(self) -> Iterator[Entry]:
-        """All runs so far, in the order in which they came in."""
-        yield from entries_of(self.path)
+    def _open(self) -> TextIO:
+        if self._kept is None:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.path.write_text(json.dumps({"study": self._key}) + "\n")
+        else:
+            with self.path.open("r+b") as file:
+                file.truncate(self._kept)
+        self._file = self.path.open("a")
+        return self._file
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
 
 
-def entries_of(path: Path) -> Iterator[Entry]:
-    """Runs of a journal; of several tries of one the last counts, so it comes again."""
-    with path.open() as file:
-        next(file)
+def _whole_lines(path: Path, key: str) -> int:
+    """Length of the whole lines of the journal of a study [byte]."""
+    raw = path.read_bytes()
+    try:
+        found = json.loads(raw[: raw.index(b"\n")])["study"]
+    except (ValueError, KeyError, TypeError):
+        raise InputError("is no journal of a study", file=str(path)) from None
+    if found != key:
+        reason = "is of another study, or of another version: name another --out"
+        raise InputError(reason, file=str(path))
+    return raw.rfind(b"\n") + 1
+
+
+class Entries:
+    """The runs of a journal that count: the last try of each, by cells and seeds.
+
+    They are read from the file again each time, so that any number of them can be gone through.
+
+    Parameters
+    ----------
+    path : Path
+        Of a journal; one that there is not has no runs.
+    ended : mapping of int to int
+        Runs after which cells have had enough; later ones do not count.
+
+    Raises
+    ------
+    InputError
+        If a line is none of a journal.
+    """
+
+    def __init__(self, path: Path, ended: Mapping[int, int] | None = None) -> None:
+        self._path = path
+        #: Names of what else was drawn, and of figures, in the order in which they came.
+        self.facts: tuple[str, ...] = ()
+        self.figures: tuple[str, ...] = ()
+        keys, places = array("q"), array("q")
+        facts: dict[str, None] = {}
+        figures: dict[str, None] = {}
+        for place, entry in _lines(path):
+            keys.extend(entry.key)
+            places.append(place)
+            facts.update(dict.fromkeys(entry.facts))
+            figures.update(dict.fromkeys(entry.figures))
+        self.facts, self.figures = tuple(facts), tuple(figures)
+        self._places = _counting(
+            np.array(keys, dtype=np.int64).reshape(-1, 2),
+            np.array(places, dtype=np.int64),
+            ended or {},
+        )
+
+    def __len__(self) -> int:
+        return int(self._places.size)
+
+    def __iter__(self) -> Iterator[Entry]:
+        if not len(self):
+            return
+        with self._path.open("rb") as file:
+            for place in self._places.tolist():
+                file.seek(place)
+                yield Entry(**json.loads(file.readline()))
+
+
+def _counting(keys: _Places, places: _Places, ended: Mapping[int, int]) -> _Places:
+    """Places of the last line of each run, in the order of the runs."""
+    order = np.lexsort((places, keys[:, 1], keys[:, 0]))
+    keys, places = keys[order], places[order]
+    last = np.ones(len(keys), dtype=bool)
+    last[:-1] = (keys[1:] != keys[:-1]).any(axis=1)
+    for cell, runs in ended.items():
+        last &= (keys[:, 0] != cell) | (keys[:, 1] < runs)
+    return np.asarray(places[last], dtype=np.int64)
+
+
+def _lines(path: Path) -> Iterator[tuple[int, Entry]]:
+    """Runs of a journal in the order in which they came in, with their places in the file."""
+    if not path.exists():
+        return
+    with path.open("rb") as file:
+        place = len(file.readline())
         for line in file:
-            if line.endswith("\n"):
-                yield Entry(**json.loads(line))
+            if line.endswith(b"\n"):
+                try:
+                    entry = Entry(**json.loads(line))
+                except (ValueError, TypeError):
+                    reason = "is no run of a study"
+                    raise InputError(reason, file=str(path), value=f"byte {place}") from None
+                yield place, entry
+            place += len(line)
 
 
 def _plain(value: Any) -> Any:

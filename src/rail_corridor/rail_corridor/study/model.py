@@ -43,7 +43,8 @@ class Stop(BaseModel):
 class Study(BaseModel):
     """One study: what is run, what is varied, what is looked at.
 
-    A *cell* is one combination of the values in ``vary``; it is run with seeds of its own.
+    A *cell* is one of ``cells`` with one combination of the values in ``vary``; it is run with
+    seeds of its own.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -58,6 +59,9 @@ class Study(BaseModel):
     parameters: dict[str, Any] = Field(
         default_factory=dict, description="of generator or calculation; fields of a scenario"
     )
+    cells: tuple[dict[str, Any], ...] = Field(
+        (), description="values that go together; all of them set the same fields"
+    )
     vary: dict[str, tuple[Any, ...]] = Field(
         default_factory=dict, description="each value of each field with each of the others"
     )
@@ -67,25 +71,51 @@ class Study(BaseModel):
     figures: dict[str, Figure] = Field(default_factory=dict)
     stop: Stop = Stop()
     group_by: tuple[str, ...] | None = Field(
-        None, description="columns of the summary; those of vary if not said"
+        None, description="columns of the summary; those of cells and vary if not said"
     )
     timeout_s: float = Field(900.0, gt=0.0, description="wall time of one run")
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Fields that differ from cell to cell."""
+        return (*(self.cells[0] if self.cells else ()), *self.vary)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """What the runs of the summary are grouped by."""
+        return self.varied if self.group_by is None else self.group_by
 
     @model_validator(mode="after")
     def _has_one_source(self) -> Study:
         given = [each for each in (self.scenario, self.generator, self.calculation) if each]
         if len(given) != 1:
             raise ValueError("scenario: one of scenario, generator or calculation is needed")
-        twice = {*self.vary} & {*self.draw}
-        if twice:
-            raise ValueError(f"draw.{min(twice)}: is varied already")
+        return self
+
+    @model_validator(mode="after")
+    def _has_cells(self) -> Study:
+        for number, cell in enumerate(self.cells):
+            for name in {*cell} ^ {*self.cells[0]}:
+                raise ValueError(f"cells.{number}: all must set the same, not only some {name}")
         for field, values in self.vary.items():
             if not values:
                 raise ValueError(f"vary.{field}: there is no value")
+            if self.cells and field in self.cells[0]:
+                raise ValueError(f"vary.{field}: is set by the cells already")
+        for field in self.draw:
+            if field in self.varied:
+                raise ValueError(f"draw.{field}: is varied already")
+        return self
+
+    @model_validator(mode="after")
+    def _has_figures(self) -> Study:
         if not self.figures and self.calculation is None:
             raise ValueError("figures: at least one is needed")
-        if self.figures:
-            for rule in (self.stop.half_width, self.stop.events):
-                if rule is not None and rule.figure not in self.figures:
-                    raise ValueError(f"stop: {rule.figure!r} is none of the figures")
+        for name, figure in self.figures.items():
+            for key, other in (("per", figure.per), ("beside", figure.beside)):
+                if other is not None and other not in self.figures:
+                    raise ValueError(f"figures.{name}.{key}: is none of the figures")
+        for key, rule in (("half_width", self.stop.half_width), ("events", self.stop.events)):
+            if rule is not None and rule.figure not in self.figures:
+                raise ValueError(f"stop.{key}.figure: is none of the figures")
         return self

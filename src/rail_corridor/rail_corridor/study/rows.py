@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import importlib.util
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,6 +12,8 @@ from .journal import Entry
 
 _FIRST: Final = ("study", "version", "cell", "run", "seed")
 _LAST: Final = "failure"
+#: Rows of a Parquet file that are written, and held in memory, together.
+_TOGETHER: Final = 20_000
 
 
 class Rows:
@@ -38,61 +39,73 @@ class Rows:
         self.values, self.facts, self.figures = tuple(values), tuple(facts), tuple(figures)
         self.columns = (*_FIRST, *self.values, *self.facts, *self.figures, _LAST)
 
-    def row(self, entry: Entry) -> dict[str, Any]:
-        """One row, by column."""
-        return {
-            **dict(zip(_FIRST, (self._study, self._version, *entry.key, entry.seed), strict=True)),
-            **{name: entry.values.get(name) for name in self.values},
-            **{name: entry.facts.get(name) for name in self.facts},
-            **{name: entry.figures.get(name) for name in self.figures},
-            _LAST: entry.failure,
-        }
-
-
-def counting(entries: Iterable[Entry], ended: Mapping[int, int]) -> list[Entry]:
-    """Those that count: the last of each run, none after the end of its cell."""
-    last = {entry.key: entry for entry in entries}
-    return [last[key] for key in sorted(last) if key[1] < ended.get(key[0], 1 << 62)]
+    def row(self, entry: Entry) -> list[Any]:
+        """One row, column by column; None where a value is not known."""
+        return [
+            *(self._study, self._version, *entry.key, entry.seed),
+            *(entry.values.get(name) for name in self.values),
+            *(entry.facts.get(name) for name in self.facts),
+            *(entry.figures.get(name) for name in self.figures),
+            entry.failure,
+        ]
 
 
 def write_csv(path: Path, rows: Rows, entries: Iterable[Entry]) -> None:
     """Write a CSV file; what is not known is an empty cell."""
     with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows.columns)
-        writer.writeheader()
+        writer = csv.writer(file)
+        writer.writerow(rows.columns)
         writer.writerows(map(rows.row, entries))
 
 
-def write_parquet(path: Path, rows: Rows, entries: Iterable[Entry]) -> bool:
-    """Write a Parquet file; whether that could be, which takes pyarrow."""
-    if importlib.util.find_spec("pyarrow") is None:
-        return False
+def has_parquet() -> bool:
+    """Whether Parquet files can be written: pyarrow is an extra."""
+    return importlib.util.find_spec("pyarrow") is not None
+
+
+def write_parquet(path: Path, rows: Rows, entries: Iterable[Entry]) -> None:
+    """Write a Parquet file, `_TOGETHER` rows at a time; see `has_parquet`.
+
+    Figures are floating-point numbers; what was set or drawn is a number where it always is, and
+    else a text.
+    """
     from importlib import import_module
 
     pa, pq = import_module("pyarrow"), import_module("pyarrow.parquet")
-
-    table = [rows.row(entry) for entry in entries]
-    columns = {name: [row[name] for row in table] for name in rows.columns}
-    # Values of a field may be of several kinds.
-    plain = {
-        name: [None if v is None else str(v) for v in column] if _is_mixed(column) else column
-        for name, column in columns.items()
+    kinds: dict[str, set[type]] = {name: set() for name in (*rows.values, *rows.facts)}
+    for entry in entries:
+        for name, value in (*entry.values.items(), *entry.facts.items()):
+            kinds[name].add(type(value))
+    types = {
+        **dict.fromkeys(("cell", "run", "seed"), pa.int64()),
+        **dict.fromkeys(rows.figures, pa.float64()),
+        **{name: _type_of(pa, found) for name, found in kinds.items()},
     }
-    pq.write_table(pa.table(plain), path)
-    return True
+    schema = pa.schema([(name, types.get(name, pa.string())) for name in rows.columns])
+    texts = [types.get(name, pa.string()) == pa.string() for name in rows.columns]
+    with pq.ParquetWriter(path, schema) as writer:
+        waiting: list[list[Any]] = []
+        for entry in entries:
+            waiting.append(rows.row(entry))
+            if len(waiting) == _TOGETHER:
+                writer.write_table(_table(pa, schema, texts, waiting))
+                waiting.clear()
+        writer.write_table(_table(pa, schema, texts, waiting))
 
 
-def _is_mixed(column: Sequence[Any]) -> bool:
-    kinds = {type(value) for value in column if value is not None}
-    return (len(kinds - {int, float}) > 0 and len(kinds) > 1) or bool(kinds & {dict, list})
+def _type_of(pa: Any, kinds: set[type]) -> Any:
+    kinds = kinds - {type(None)}
+    for plain, as_type in ((bool, pa.bool_()), (int, pa.int64()), (float, pa.float64())):
+        if kinds == {plain}:
+            return as_type
+    return pa.float64() if kinds == {int, float} else pa.string()
 
 
-def read_csv(path: Path) -> Iterator[dict[str, str]]:
-    """Rows of a file that a study has written."""
-    with path.open(newline="") as file:
-        yield from csv.DictReader(file)
-
-
-def number(text: str | float | None) -> float:
-    """A cell as a number, NaN where it is not known."""
-    return float(text) if text not in (None, "") else math.nan
+def _table(pa: Any, schema: Any, texts: Sequence[bool], rows: Sequence[Sequence[Any]]) -> Any:
+    columns = []
+    for place, (field, text) in enumerate(zip(schema, texts, strict=True)):
+        column = [row[place] for row in rows]
+        if text:
+            column = [None if value is None else str(value) for value in column]
+        columns.append(pa.array(column, type=field.type))
+    return pa.table(columns, schema=schema)

@@ -32,6 +32,9 @@ class Source(Protocol):
     def check(self, values: Mapping[str, Any], seed: int) -> None:
         """Raise InputError for values that there cannot be; starts nothing."""
 
+    def try_out(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> None:
+        """Raise InputError for figures that a run does not have, by the first tick of one."""
+
     def run(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> Outcome:
         """Make a run; the same for the same arguments wherever it is made."""
 
@@ -55,10 +58,13 @@ class ScenarioSource:
         """See `Source`."""
         self._scenario(values, seed)
 
+    def try_out(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> None:
+        """See `Source`."""
+        found(figures, report_of_run(self._scenario(values, seed), ticks=1))
+
     def run(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> Outcome:
         """See `Source`."""
-        report = report_of_run(self._scenario(values, seed))
-        return Outcome({}, {name: figure_of(name, each, report) for name, each in figures.items()})
+        return Outcome({}, found(figures, report_of_run(self._scenario(values, seed))))
 
     def _scenario(self, values: Mapping[str, Any], seed: int) -> Any:
         data = with_fields(self.data, {**values, "seed": seed})
@@ -83,24 +89,52 @@ class GeneratorSource:
         Of the generator: its fields are what a study may vary.
     draw : callable
         Scenario of the parameters and a seed.
+    look : callable, optional
+        Further figures of what was drawn and its report; with what was drawn they stand in it
+        under ``drawn``.
+    fixed : mapping
+        Parameters that are the same in every run.
     """
 
     parameters: type[BaseModel]
     draw: Callable[[Any, int], Drawn]
+    look: Callable[[Drawn, Mapping[str, Any]], Mapping[str, float | None]] | None = None
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
     def check(self, values: Mapping[str, Any], seed: int) -> None:
         """See `Source`."""
-        drawn = self.draw(checked(self.parameters, {**self.fixed, **values}), seed)
-        scenario_from_data(drawn.data, directory=Path.cwd())
+        scenario_from_data(self.drawn(values, seed).data, directory=Path.cwd())
+
+    def try_out(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> None:
+        """See `Source`."""
+        self._outcome(values, seed, figures, ticks=1)
 
     def run(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> Outcome:
         """See `Source`."""
-        drawn = self.draw(checked(self.parameters, {**self.fixed, **values}), seed)
+        return self._outcome(values, seed, figures)
+
+    def drawn(self, values: Mapping[str, Any], seed: int) -> Drawn:
+        """The scenario of a seed.
+
+        Raises
+        ------
+        InputError
+            If there can be no such values.
+        """
+        return self.draw(checked(self.parameters, {**self.fixed, **values}), seed)
+
+    def _outcome(
+        self,
+        values: Mapping[str, Any],
+        seed: int,
+        figures: Mapping[str, Figure],
+        ticks: int | None = None,
+    ) -> Outcome:
+        drawn = self.drawn(values, seed)
         scenario = scenario_from_data(drawn.data, directory=Path.cwd())
-        report = report_of_run(scenario, kills=drawn.kills)
-        found = {name: figure_of(name, each, report) for name, each in figures.items()}
-        return Outcome(dict(drawn.facts), found)
+        report = report_of_run(scenario, kills=drawn.kills, ticks=ticks)
+        report["drawn"] = {**drawn.facts, **(self.look(drawn, report) if self.look else {})}
+        return Outcome(dict(drawn.facts), found(figures, report))
 
 
 @dataclass(frozen=True)
@@ -123,13 +157,21 @@ class CalculationSource:
         """See `Source`."""
         checked(self.parameters, {**self.fixed, **values})
 
+    def try_out(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> None:
+        """See `Source`: a calculation cannot be begun only."""
+
     def run(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> Outcome:
         """See `Source`."""
         given = self.calculate(checked(self.parameters, {**self.fixed, **values}), seed)
         report = {name: None if each is None else float(each) for name, each in given.items()}
         if not figures:
             return Outcome({}, report)
-        return Outcome({}, {name: figure_of(name, each, report) for name, each in figures.items()})
+        return Outcome({}, found(figures, report))
+
+
+def found(figures: Mapping[str, Figure], report: Mapping[str, Any]) -> dict[str, float | None]:
+    """Values of figures in a report."""
+    return {name: figure_of(name, each, report) for name, each in figures.items()}
 
 
 def checked(model: type[BaseModel], values: Mapping[str, Any]) -> BaseModel:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Mapping
+from typing import Final
 
-from .figures import Figure, OverRuns
+from .figures import Figure
 from .intervals import estimate
 from .model import Stop
+
+#: An interval is looked at again after one run in so many more.
+_SELDOM: Final = 50
 
 
 class Stopping:
@@ -26,8 +31,9 @@ class Stopping:
     def __init__(self, rule: Stop, figures: Mapping[str, Figure], runs: int) -> None:
         self._rule, self._figures, self._most = rule, figures, runs
         self._waiting: dict[int, Mapping[str, float | None] | None] = {}
-        self._values: list[float] = []
+        self._values, self._per = array("d"), array("d")
         self._sum = 0.0
+        self._look_at = 0
         #: Runs that have been looked at, all from the first on.
         self.seen = 0
         #: Runs after which it was enough, None as long as more are wanted.
@@ -44,24 +50,34 @@ class Stopping:
             if self._is_enough() or self.seen >= self._most:
                 self.ended = self.seen
                 self._waiting.clear()
-                self._values.clear()
+                del self._values[:], self._per[:]
 
     def _look(self, figures: Mapping[str, float | None] | None) -> None:
         if figures is None:
             return
         if self._rule.half_width is not None:
-            value = figures.get(self._rule.half_width.figure)
-            self._values.append(math.nan if value is None else value)
+            name = self._rule.half_width.figure
+            self._values.append(_known(figures.get(name)))
+            per = self._figures[name].per
+            self._per.append(1.0 if per is None else _known(figures.get(per)))
         if self._rule.events is not None:
-            value = figures.get(self._rule.events.figure)
-            self._sum += 0.0 if value is None or math.isnan(value) else value
+            value = _known(figures.get(self._rule.events.figure))
+            self._sum += 0.0 if math.isnan(value) else value
 
     def _is_enough(self) -> bool:
         rule = self._rule
         if rule.events is not None and self._sum >= rule.events.count:
             return True
-        if rule.half_width is None or len(self._values) < rule.half_width.least_runs:
+        n = len(self._values)
+        if rule.half_width is None or n < max(rule.half_width.least_runs, self._look_at):
             return False
-        how = self._figures[rule.half_width.figure].over_runs
-        kind: OverRuns = "proportion" if how == "proportion" else "mean"
-        return estimate(self._values, kind).half_width <= rule.half_width.below
+        self._look_at = n + 1 + n // _SELDOM
+        figure = self._figures[rule.half_width.figure]
+        # What has no interval of its own is judged by its mean.
+        how = "mean" if figure.over_runs in ("sum", "min", "max") else figure.over_runs
+        found = estimate(self._values, how, None if figure.per is None else self._per)
+        return found.half_width <= rule.half_width.below
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
+from rich.console import Console
+from rich.table import Table
 
 from rail_corridor.errors import InputError, did_you_mean, from_validation
 from rail_corridor.loading.loader import builtin_scenarios
 from rail_corridor.yaml_file import load_yaml
 
 from .cells import case_of, cells_of
+from .fields import with_fields
 from .model import Study
 from .sources import CalculationSource, GeneratorSource, ScenarioSource, Source, relative
 
@@ -35,7 +39,7 @@ def load_study(
     generators, calculations : mappings
         What a study may name.
     overrides : mapping, optional
-        Fields of the study that have other values: ``runs``, ``first_seed``.
+        Fields of the study by their dotted names, and the values that they have instead.
 
     Raises
     ------
@@ -43,8 +47,8 @@ def load_study(
         One line that names the file, the field and the value.
     """
     path = _find(name_or_path, folder)
-    data = {**load_yaml(path), **{k: v for k, v in (overrides or {}).items() if v is not None}}
     try:
+        data = with_fields(load_yaml(path), overrides or {})
         try:
             study = Study.model_validate(data)
         except ValidationError as error:
@@ -54,6 +58,14 @@ def load_study(
     except InputError as error:
         raise error.located(str(path)) from None
     return study, source
+
+
+def list_studies(folder: Path, console: Console) -> None:
+    """Show what studies come with the corridor."""
+    table = Table(box=None, show_header=False)
+    for path in sorted(folder.glob("*.yaml")):
+        table.add_row(path.stem, str(load_yaml(path).get("description", "")))
+    console.print(table)
 
 
 def _find(name: str, folder: Path) -> Path:
@@ -74,15 +86,13 @@ def _source_of(
     calculations: Mapping[str, CalculationSource],
 ) -> Source:
     if study.generator is not None:
-        found = _named(study.generator, generators, "generator")
-        return GeneratorSource(found.parameters, found.draw, study.parameters)
+        drawn: GeneratorSource = _named(study.generator, generators, "generator")
+        return replace(drawn, fixed=study.parameters)
     if study.calculation is not None:
-        known = _named(study.calculation, calculations, "calculation")
-        return CalculationSource(known.parameters, known.calculate, study.parameters)
+        known: CalculationSource = _named(study.calculation, calculations, "calculation")
+        return replace(known, fixed=study.parameters)
     assert study.scenario is not None
     data, directory = _scenario_data(study.scenario, directory)
-    from .fields import with_fields
-
     return ScenarioSource(with_fields(data, study.parameters), directory)
 
 
@@ -112,21 +122,28 @@ def _check(study: Study, source: Source) -> None:
     """See that every value of every field can be, with the first values of all others."""
     where = {
         **{name: f"parameters.{name}" for name in study.parameters},
+        **{name: f"cells.*.{name}" for name in study.varied},
         **{name: f"vary.{name}" for name in study.vary},
         **{name: f"draw.{name}" for name in study.draw},
     }
-    cells = cells_of(study)
-    first = dict(case_of(study, cells, 0, 0).values)
-    changes: list[dict[str, Any]] = [{}]
+    first = dict(case_of(study, cells_of(study), 0, 0).values)
+    changes: list[Mapping[str, Any]] = [{}, *study.cells[1:]]
     changes += [{name: value} for name, values in study.vary.items() for value in values[1:]]
+    changes += [{name: end} for name, law in study.draw.items() for end in law.extremes()]
     for change in changes:
         values = {**first, **change}
         try:
             source.check(values, study.first_seed)
         except InputError as error:
             raise relative(error, {**study.parameters, **values}, where) from None
+    _check_columns(study, source, first)
 
 
-def parameter_names(model: type[BaseModel]) -> tuple[str, ...]:
-    """Fields that a study may set of a generator or calculation."""
-    return tuple(model.model_fields)
+def _check_columns(study: Study, source: Source, values: Mapping[str, Any]) -> None:
+    known = [*study.varied, *study.draw]
+    if isinstance(source, GeneratorSource):
+        known += source.drawn(values, study.first_seed).facts
+    for name in study.columns:
+        if name not in known:
+            reason = f"is neither varied nor drawn{did_you_mean(name, known)}"
+            raise InputError(reason, field="group_by", value=name)

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from array import array
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from rich.console import Console
+from rich.markup import escape
+from rich.measure import Measurement
 from rich.table import Table
 
 from .figures import Figure
 from .intervals import Estimate, estimate
 from .journal import Entry
+from .model import Study
+
+#: An interval is even when its middle is off the value by no more than this part of it.
+_EVEN: Final = 0.05
+_UNLIMITED: Final = 100_000
 
 
 @dataclass(frozen=True)
@@ -25,33 +33,49 @@ class Group:
     estimates: Mapping[str, Estimate]
 
 
+class _Members:
+    """Values of the runs of one group."""
+
+    def __init__(self, figures: Mapping[str, Figure]) -> None:
+        self.runs = self.failed = 0
+        self.values = {name: array("d") for name in figures}
+
+    def add(self, entry: Entry) -> None:
+        if entry.failure is not None:
+            self.failed += 1
+            return
+        self.runs += 1
+        for name, values in self.values.items():
+            value = entry.figures.get(name)
+            values.append(math.nan if value is None else value)
+
+    def group(self, key: tuple[Any, ...], figures: Mapping[str, Figure]) -> Group:
+        estimates = {
+            name: estimate(
+                self.values[name],
+                figure.over_runs,
+                None if figure.per is None else self.values[figure.per],
+            )
+            for name, figure in figures.items()
+        }
+        return Group(key, self.runs, self.failed, estimates)
+
+
 def groups_of(
     entries: Iterable[Entry], by: Sequence[str], figures: Mapping[str, Figure]
 ) -> list[Group]:
     """Groups in the order in which they come first, numbers in theirs."""
-    members: dict[tuple[Any, ...], list[Entry]] = {}
+    members: dict[tuple[Any, ...], _Members] = {}
     for entry in entries:
         found = {**entry.values, **entry.facts}
-        members.setdefault(tuple(_plain(found.get(name)) for name in by), []).append(entry)
-    groups = [_group(key, group, figures) for key, group in members.items()]
+        key = tuple(_plain(found.get(name)) for name in by)
+        if key not in members:
+            members[key] = _Members(figures)
+        members[key].add(entry)
+    groups = [each.group(key, figures) for key, each in members.items()]
     if all(_is_ordered(group.key) for group in groups):
         groups.sort(key=lambda group: group.key)
     return groups
-
-
-def _group(key: tuple[Any, ...], group: list[Entry], figures: Mapping[str, Figure]) -> Group:
-    made = [entry for entry in group if entry.failure is None]
-    values = {name: [_known(entry.figures.get(name)) for entry in made] for name in figures}
-    return Group(
-        key,
-        len(made),
-        len(group) - len(made),
-        {name: estimate(values[name], figures[name].over_runs) for name in figures},
-    )
-
-
-def _known(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 def _plain(value: Any) -> Any:
@@ -71,39 +95,64 @@ class Violation:
     value: float | None
 
 
-def violations_of(entries: Iterable[Entry], figures: Mapping[str, Figure]) -> list[Violation]:
+def violations_of(entries: Iterable[Entry], figures: Mapping[str, Figure]) -> Iterator[Violation]:
     """Every violation of every run that has not failed."""
-    return [
-        Violation(entry, name, entry.figures.get(name))
-        for entry in entries
-        if entry.failure is None
-        for name, figure in figures.items()
-        if figure.violated_by(entry.figures.get(name))
-    ]
+    for entry in entries:
+        if entry.failure is None:
+            for name, figure in figures.items():
+                if figure.violated_by(entry.figures.get(name)):
+                    yield Violation(entry, name, entry.figures.get(name))
+
+
+def total_of(groups: Sequence[Group], entries: Iterable[Entry], study: Study) -> Group | None:
+    """All runs together, of the figures of which that says something; None for one group."""
+    figures = {
+        name: figure
+        for name, figure in study.figures.items()
+        if figure.over_runs in ("sum", "min", "max") or figure.per is not None
+    }
+    if len(groups) < 2 or not figures:
+        return None
+    needed = {**figures, **{f.per: study.figures[f.per] for f in figures.values() if f.per}}
+    (total,) = groups_of(entries, (), needed)
+    return total
 
 
 def print_summary(
     title: str,
     groups: Sequence[Group],
     by: Sequence[str],
-    figures: Mapping[str, Figure],
+    names: Sequence[str],
     console: Console,
+    total: Group | None = None,
 ) -> None:
-    """Show the groups as tables as wide as the console; ± is half of a 95 % interval."""
-    names = list(figures)
+    """Show figures of groups as tables as wide as the console, with their 95 % intervals."""
+    names = list(names)
     while True:
         shown = len(names)
-        while shown > 1 and console.measure(_table(title, groups, by, names[:shown])).minimum > (
-            console.width
+        while shown > 1 and (
+            _width(_table(title, groups, by, names[:shown], total), console) > console.width
         ):
             shown -= 1
-        console.print(_table(title, groups, by, names[:shown]))
+        console.print(_table(title, groups, by, names[:shown], total))
         names = names[shown:]
         if not names:
             return
 
 
-def _table(title: str, groups: Sequence[Group], by: Sequence[str], names: Sequence[str]) -> Table:
+def _width(table: Table, console: Console) -> int:
+    """Width that a table would like to have."""
+    unlimited = console.options.update(max_width=_UNLIMITED)
+    return Measurement.get(console, unlimited, table).maximum
+
+
+def _table(
+    title: str,
+    groups: Sequence[Group],
+    by: Sequence[str],
+    names: Sequence[str],
+    total: Group | None,
+) -> Table:
     table = Table(title=title, title_justify="left", title_style="bold")
     for name in by:
         table.add_column(name.rpartition(".")[2].replace("_", "\n"), no_wrap=True)
@@ -111,23 +160,34 @@ def _table(title: str, groups: Sequence[Group], by: Sequence[str], names: Sequen
     for name in names:
         table.add_column(name.replace("_", "\n"), justify="right", no_wrap=True)
     for group in groups:
-        failed = f" [red]+{group.failed} failed[/red]" if group.failed else ""
-        table.add_row(
-            *(f"{value:g}" if isinstance(value, float) else str(value) for value in group.key),
-            f"{group.runs}{failed}",
-            *(text_of(group.estimates[name]) for name in names),
-        )
+        table.add_row(*_cells(group, names), end_section=group is groups[-1])
+    if total is not None:
+        table.add_row("all", *[""] * (len(by) - 1), *_cells(total, names))
     return table
 
 
-def text_of(estimate: Estimate) -> str:
-    """An estimate in a cell: as many digits as its interval is worth.
+def _cells(group: Group, names: Sequence[str]) -> list[str]:
+    failed = f" [red]+{group.failed} failed[/red]" if group.failed else ""
+    return [
+        *(f"{v:g}" if isinstance(v, float) else escape(str(v)) for v in group.key),
+        f"{group.runs}{failed}",
+        *(escape(text_of(group.estimates[n])) if n in group.estimates else "" for n in names),
+    ]
 
-    >>> text_of(Estimate(0.12345, 0.12, 0.13, 10)), text_of(Estimate(3.0, math.nan, math.nan, 1))
-    ('0.1235 ± 0.005', '3')
+
+def text_of(estimate: Estimate) -> str:
+    """An estimate in a cell: with ± if its interval is even on both sides, else with its ends.
+
+    >>> text_of(Estimate(0.12345, 0.12, 0.1269, 10)), text_of(Estimate(0.0, 0.0, 0.0037, 1000))
+    ('0.1235 ± 0.0034', '0 [0, 0.0037]')
+    >>> text_of(Estimate(3.0, math.nan, math.nan, 1)), text_of(Estimate(math.nan, 0.0, 0.0, 0))
+    ('3', '-')
     """
-    if math.isnan(estimate.value):
+    value, low, high = estimate.value, estimate.low, estimate.high
+    if math.isnan(value):
         return "-"
     if math.isnan(estimate.half_width):
-        return f"{estimate.value:.6g}"
-    return f"{estimate.value:.4g} ± {estimate.half_width:.2g}"
+        return f"{value:.6g}"
+    if abs(high + low - 2.0 * value) <= _EVEN * (high - low):
+        return f"{value:.4g} ± {estimate.half_width:.2g}"
+    return f"{value:.3g} [{low:.2g}, {high:.2g}]"

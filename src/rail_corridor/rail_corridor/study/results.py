@@ -1,0 +1,115 @@
+"""What a study leaves behind: rows, a summary, a picture, and what must not have happened."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from rich.console import Console
+from rich.markup import escape
+
+from rail_corridor.errors import InputError
+
+from .comparison import moves
+from .figures import Figure
+from .journal import Entries, Entry
+from .model import Study
+from .picture import draw_study
+from .rows import Rows, has_parquet, write_csv, write_parquet
+from .summary import Group, groups_of, print_summary, text_of, total_of, violations_of
+
+JOURNAL: Final = "journal.jsonl"
+#: Runs that are told one by one.
+_MOST_TOLD: Final = 20
+
+
+class StudyOutcome(NamedTuple):
+    """What came of a study: groups of its runs, and how many were not as they must be."""
+
+    study: Study
+    entries: Entries
+    groups: list[Group]
+    violations: int
+    failed: int
+
+
+def with_all_figures(study: Study, entries: Entries) -> Study:
+    """The study; one of a calculation that names no figures has all that there are."""
+    if study.figures:
+        return study
+    return study.model_copy(update={"figures": {name: Figure() for name in entries.figures}})
+
+
+def conclude(
+    study: Study, entries: Entries, out: Path, code: str, console: Console, command: str
+) -> StudyOutcome:
+    """Write and show runs; ``command`` is that of the study, to which ``--only`` can be added."""
+    study = with_all_figures(study, entries)
+    rows = Rows(
+        study.name,
+        code,
+        [*study.varied, *study.draw],
+        [name for name in entries.facts if name not in study.figures],
+        list(study.figures),
+    )
+    groups = groups_of(entries, study.columns, study.figures)
+    failures = [entry for entry in entries if entry.failure is not None]
+    violations = violations_of(entries, study.figures)
+    if not groups:
+        console.print("no run has ended")
+        return StudyOutcome(study, entries, groups, 0, 0)
+    write_csv(out / "rows.csv", rows, entries)
+    if has_parquet():
+        write_parquet(out / "rows.parquet", rows, entries)
+    names = [name for name, figure in study.figures.items() if figure.beside is None]
+    total = total_of(groups, entries, study)
+    print_summary(study.name, groups, study.columns, list(study.figures), console, total)
+    draw_study(out / "summary.png", study, groups, names)
+    told = list(islice(violations, _MOST_TOLD))
+    for violation in told:
+        said = f"[red]{violation.figure} is {violation.value}[/red]"
+        console.print(f"{said}: {_again(command, violation.entry)}", soft_wrap=True)
+    for entry in failures[:_MOST_TOLD]:
+        said = f"[red]failed:[/red] {escape(str(entry.failure))}"
+        console.print(f"{said}: {_again(command, entry)}", soft_wrap=True)
+    violated = len(told) + sum(1 for _ in violations)
+    for count, what in (
+        (violated, "figures that are not as they must be"),
+        (len(failures), "failed runs"),
+    ):
+        if count > _MOST_TOLD:
+            console.print(f"[red]{count} {what} in all[/red]")
+    console.print(f"{len(entries)} rows in {out / 'rows.csv'}", soft_wrap=True)
+    return StudyOutcome(study, entries, groups, violated, len(failures))
+
+
+def _again(command: str, entry: Entry) -> str:
+    """The command that makes one run once more."""
+    return f"{command} --only {entry.cell}:{entry.run}"
+
+
+def entries_of(folder: Path) -> Entries:
+    """Runs of an earlier study; InputError if there are none in a folder."""
+    path = folder / JOURNAL
+    if not path.is_file():
+        raise InputError(f"there is no {JOURNAL}", field="--compare", value=str(folder))
+    return Entries(path)
+
+
+def print_moves(before: Entries, now: StudyOutcome, console: Console) -> bool:
+    """Show which figures have moved beyond their intervals; whether any has."""
+    study = now.study
+    old = groups_of(before, study.columns, study.figures)
+    compared, found = moves(old, now.groups, study.figures)
+    for move in found:
+        key = zip(study.columns, move.key, strict=True)
+        where = ", ".join(f"{name} {value}" for name, value in key)
+        said = f"{move.figure}: {text_of(move.before)}, now {text_of(move.now)}"
+        said = escape(f"{where + ': ' if where else ''}{said}")
+        console.print(f"[yellow]moved:[/yellow] {said}", soft_wrap=True)
+    if not compared:
+        console.print("[yellow]no group of runs is in both studies[/yellow]")
+    elif not found:
+        console.print(f"nothing has moved beyond its interval in {compared} groups")
+    return bool(found)

@@ -25,6 +25,7 @@ MODULES = {
     "train_bus_traces": "train_bus",
     "corridor_speed": "corridor",
     "recording_cost": "corridor",
+    "study_speed": "study",
 }
 
 

@@ -57,6 +57,12 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             "temporary-directory": scratch,
             # Ctrl-C is said to the whole group: workers are ended by who has started them.
             "distributed.worker.preload": [_HEEDLESS],
+            # By default workers are looked at a hundred times a second, at the cost of the runs.
+            "distributed.worker.profile.enabled": False,
+            "distributed.worker.memory.monitor-interval": "1s",
+            "distributed.admin.tick.interval": "2s",
+            "distributed.admin.tick.limit": "1h",
+            "distributed.admin.system-monitor.interval": "5s",
             # Who makes a run once more is the engine.
             "distributed.scheduler.allowed-failures": 0,
         }

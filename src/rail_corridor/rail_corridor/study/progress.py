@@ -36,7 +36,7 @@ def progress(console: Console, name: str) -> Iterator[Show]:
         TextColumn("to go"),
         TimeRemainingColumn(elapsed_when_finished=False),
     )
-    with Progress(*columns, console=console, transient=True) as display:
+    with Progress(*columns, console=console, transient=True, refresh_per_second=2) as display:
         task = display.add_task(name, total=None, state="starting workers")
 
         def show(done: int, failed: int, running: int, wanted: int) -> None:

@@ -61,7 +61,7 @@ def conclude(
         return StudyOutcome(study, entries, groups, 0, 0)
     write_csv(out / "rows.csv", rows, entries)
     if has_parquet():
-        write_parquet(out / "rows.parquet", rows, entries)
+        write_parquet(out / "rows.parquet", out / "rows.csv", rows, entries)
     names = [name for name, figure in study.figures.items() if figure.beside is None]
     total = total_of(groups, entries, study)
     print_summary(study.name, groups, study.columns, list(study.figures), console, total)

@@ -12,8 +12,6 @@ from .journal import Entry
 
 _FIRST: Final = ("study", "version", "cell", "run", "seed")
 _LAST: Final = "failure"
-#: Rows of a Parquet file that are written, and held in memory, together.
-_TOGETHER: Final = 20_000
 
 
 class Rows:
@@ -63,8 +61,8 @@ def has_parquet() -> bool:
     return importlib.util.find_spec("pyarrow") is not None
 
 
-def write_parquet(path: Path, rows: Rows, entries: Iterable[Entry]) -> None:
-    """Write a Parquet file, `_TOGETHER` rows at a time; see `has_parquet`.
+def write_parquet(path: Path, csv_path: Path, rows: Rows, entries: Iterable[Entry]) -> None:
+    """Make a Parquet file of one of `write_csv`, piece by piece; see `has_parquet`.
 
     Figures are floating-point numbers; what was set or drawn is a number where it always is, and
     else a text.
@@ -72,25 +70,26 @@ def write_parquet(path: Path, rows: Rows, entries: Iterable[Entry]) -> None:
     from importlib import import_module
 
     pa, pq = import_module("pyarrow"), import_module("pyarrow.parquet")
+    reader = import_module("pyarrow.csv")
     kinds: dict[str, set[type]] = {name: set() for name in (*rows.values, *rows.facts)}
     for entry in entries:
-        for name, value in (*entry.values.items(), *entry.facts.items()):
-            kinds[name].add(type(value))
+        found = {**entry.facts, **entry.values}
+        for name, seen in kinds.items():
+            seen.add(type(found.get(name)))
     types = {
         **dict.fromkeys(("cell", "run", "seed"), pa.int64()),
         **dict.fromkeys(rows.figures, pa.float64()),
-        **{name: _type_of(pa, found) for name, found in kinds.items()},
+        **{name: _type_of(pa, seen) for name, seen in kinds.items()},
     }
     schema = pa.schema([(name, types.get(name, pa.string())) for name in rows.columns])
-    texts = [types.get(name, pa.string()) == pa.string() for name in rows.columns]
-    with pq.ParquetWriter(path, schema) as writer:
-        waiting: list[list[Any]] = []
-        for entry in entries:
-            waiting.append(rows.row(entry))
-            if len(waiting) == _TOGETHER:
-                writer.write_table(_table(pa, schema, texts, waiting))
-                waiting.clear()
-        writer.write_table(_table(pa, schema, texts, waiting))
+    options = reader.ConvertOptions(column_types=schema, strings_can_be_null=True, null_values=[""])
+    lines = reader.ParseOptions(newlines_in_values=True)  # a failure may tell more than one
+    with (
+        reader.open_csv(csv_path, parse_options=lines, convert_options=options) as pieces,
+        pq.ParquetWriter(path, schema) as writer,
+    ):
+        for piece in pieces:
+            writer.write_batch(piece)
 
 
 def _type_of(pa: Any, kinds: set[type]) -> Any:
@@ -99,13 +98,3 @@ def _type_of(pa: Any, kinds: set[type]) -> Any:
         if kinds == {plain}:
             return as_type
     return pa.float64() if kinds == {int, float} else pa.string()
-
-
-def _table(pa: Any, schema: Any, texts: Sequence[bool], rows: Sequence[Sequence[Any]]) -> Any:
-    columns = []
-    for place, (field, text) in enumerate(zip(schema, texts, strict=True)):
-        column = [row[place] for row in rows]
-        if text:
-            column = [None if value is None else str(value) for value in column]
-        columns.append(pa.array(column, type=field.type))
-    return pa.table(columns, schema=schema)

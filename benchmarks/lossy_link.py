@@ -1,9 +1,9 @@
-"""Two hosts on one machine, joined by a wire that loses packets.
+"""Two or more hosts on one machine, joined by a wire that loses packets.
 
 Each host is a network namespace with one Ethernet device of its own (a TAP); this process carries
-the frames from one to the other and drops some, drawn from a seed. It takes no module of the kernel
-but ``tun`` - many kernels are built without ``netem`` - and leaves nothing behind: namespaces and
-devices end with the processes that are in them, however those end.
+the frames from each to all others and drops some, drawn from a seed. It takes no module of the
+kernel but ``tun`` - many kernels are built without ``netem`` - and leaves nothing behind:
+namespaces and devices end with the processes that are in them, however those end.
 
 It takes the right to make namespaces: root, or ``unshare --user --map-root-user`` where users may.
 """
@@ -126,7 +126,7 @@ class LinkedHost:
 
 
 class LossyLink:
-    """A wire between two hosts, for a ``with`` statement.
+    """A wire between hosts, for a ``with`` statement.
 
     Parameters
     ----------
@@ -134,6 +134,8 @@ class LossyLink:
         Probability that a frame is lost, either way, each for itself.
     seed : int
         Seed of the losses; each way has its own sequence.
+    hosts : int
+        How many there are.
 
     Raises
     ------
@@ -141,16 +143,16 @@ class LossyLink:
         On entry, where the machine or the user may not have such a link.
     """
 
-    def __init__(self, loss: float, seed: int = 1) -> None:
+    def __init__(self, loss: float, seed: int = 1, hosts: int = 2) -> None:
         self.loss, self.seed = loss, seed
         self.hosts: list[LinkedHost] = []
-        #: From the first host to the second, and back.
-        self.ways = (Direction(), Direction())
+        #: From each host to the others.
+        self.ways = tuple(Direction() for _ in range(hosts))
 
     def __enter__(self) -> LossyLink:
         try:
-            for address in ("10.99.0.1", "10.99.0.2"):
-                self.hosts.append(LinkedHost(address))
+            for number in range(1, len(self.ways) + 1):
+                self.hosts.append(LinkedHost(f"10.99.0.{number}"))
             self._end, self._ended = os.pipe()
         except BaseException:
             self._close_hosts()
@@ -176,27 +178,34 @@ class LossyLink:
 
     def _carry(self) -> None:
         """Carry frames until the pipe is closed."""
-        one, other = (host.wire for host in self.hosts)
+        wires = [host.wire for host in self.hosts]
         routes = {
-            source: (sink, way, random.Random(f"{self.seed} {index}").random)
-            for index, (source, sink, way) in enumerate(
-                ((one, other, self.ways[0]), (other, one, self.ways[1]))
+            source: (
+                [wire for wire in wires if wire != source],
+                way,
+                random.Random(f"{self.seed} {index}").random,
             )
+            for index, (source, way) in enumerate(zip(wires, self.ways, strict=True))
         }
         poll = select.poll()
-        for fd in (one, other, self._end):
+        for fd in (*wires, self._end):
             poll.register(fd, select.POLLIN)
         while True:
             for fd, _ in poll.poll():
                 if fd == self._end:
                     return
-                sink, way, draw = routes[fd]
-                self._carry_waiting(fd, sink, way, draw)
+                sinks, way, draw = routes[fd]
+                self._carry_waiting(fd, sinks, way, draw)
 
     def _carry_waiting(
-        self, source: int, sink: int, way: Direction, draw: Callable[[], float], most: int = 64
+        self,
+        source: int,
+        sinks: list[int],
+        way: Direction,
+        draw: Callable[[], float],
+        most: int = 64,
     ) -> None:
-        """Carry what waits at one end, but look at the other end now and then."""
+        """Carry what waits at one end, but look at the others now and then."""
         for _ in range(most):
             try:
                 frame = os.read(source, 2048)
@@ -206,5 +215,6 @@ class LossyLink:
             way.octets += len(frame)
             if draw() < self.loss:
                 way.dropped += 1
-            else:
+                continue
+            for sink in sinks:
                 os.write(sink, frame)

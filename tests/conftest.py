@@ -70,7 +70,7 @@ def module_domain() -> Iterator[int]:
 _SECOND_GROUP = {
     *("test_corridor", "test_plugin", "test_positions_on_board", "test_train_radio"),
     *("test_placement", "test_axle_counter", "test_two_hosts", "test_failures", "test_examples"),
-    *("test_losslessness", "test_listeners", "test_recordings"),
+    *("test_losslessness", "test_listeners", "test_recordings", "test_study"),
 }
 
 

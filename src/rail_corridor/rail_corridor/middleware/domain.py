@@ -21,8 +21,9 @@ class _TakenError(InputError):
     """The domain is taken."""
 
 
-#: Domains that are chosen from, where any will do.
-_FREE = range(10, 40)
+#: Domains that are chosen from, where any will do; those beyond them, whose ports no system takes
+#: for others, where these are not enough.
+_FREE, _MORE = range(10, 40), range(40, 101)
 #: The middleware has ports for no more domains.
 _MOST = 232
 
@@ -43,7 +44,8 @@ def free_domain(domain: int | None = None, directory: Path | None = None) -> Ite
         raise InputError(f"must be from 0 to {_MOST}", field="domain", value=domain)
     start = os.getpid() + next(_TURN) * 7
     turns = range(start, start + len(_FREE))
-    candidates = [domain] if domain is not None else [_FREE[n % len(_FREE)] for n in turns]
+    some = [*(_FREE[n % len(_FREE)] for n in turns), *_MORE]
+    candidates = some if domain is None else [domain]
     for candidate in candidates:
         try:
             with sole_corridor(None, directory, domain=str(candidate)):

@@ -86,6 +86,8 @@ class SteppedCorridor:
         Whether equipment of this process offers the services of its life cycle.
     intercepts : bool
         Whether messages can be intercepted and looked back at; what was sent is kept for that.
+    scratch : str or Path, optional
+        Folder in which it makes one of its own; that for temporary files if not given.
 
     Raises
     ------
@@ -105,10 +107,11 @@ class SteppedCorridor:
         placement: Placement = "one",
         switches: bool = False,
         intercepts: bool = True,
+        scratch: str | Path | None = None,
     ) -> None:
         self.scenario = scenario
         self._external, self._switches = tuple(external), switches
-        self._directory = Path(tempfile.mkdtemp(prefix="rail_corridor_"))
+        self._directory = Path(tempfile.mkdtemp(prefix="rail_corridor_", dir=scratch))
         #: Wall time without an answer after which the world gives a node up [s].
         self.timeout_s = timeout_s
         try:

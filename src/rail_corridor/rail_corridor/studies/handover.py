@@ -56,7 +56,7 @@ class HandoverParameters(BaseModel):
 
 
 def draw_handover(parameters: HandoverParameters, seed: int) -> Drawn:
-    """Scenario of a situation.
+    """Trains that cross the stations of a plain or a branching line.
 
     Parameters
     ----------

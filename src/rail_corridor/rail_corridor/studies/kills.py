@@ -52,7 +52,7 @@ class KillParameters(BaseModel):
 
 
 def draw_kill(parameters: KillParameters, seed: int) -> Drawn:
-    """Scenario of a seed, and the kill in it.
+    """Three metro trains on a line of 2.5 to 3 km, of whose equipment one piece dies.
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ class ThreatParameters(BaseModel):
 
 
 def count_threats(parameters: ThreatParameters, seed: int) -> dict[str, float | None]:
-    """What became of the frames: counts of a `CampaignRow`."""
+    """Frames of the safe channel under attack: rejected, taken, wrongly taken."""
     group = list(Threat) if parameters.threat == "all" else [parameters.threat]
     (row,) = run_threat_campaign(parameters.frames, [group], seed)
     return {

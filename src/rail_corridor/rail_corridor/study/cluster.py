@@ -13,6 +13,8 @@ from typing import Any, Final
 
 from rail_corridor.errors import InputError
 
+from .corridor_run import SCRATCH
+
 _PATIENCE_S: Final = 20.0
 _HEEDLESS: Final = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 _ALONE: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -53,7 +55,7 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         settings = {
             # Runs compute on one core each; numbers of threads are for who calls libraries at
             # will. What workers leave behind that are killed goes with the folder.
-            "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ALONE, "1") | {"TMPDIR": scratch},
+            "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ALONE, "1") | {SCRATCH: scratch},
             "temporary-directory": scratch,
             # Ctrl-C is said to the whole group: workers are ended by who has started them.
             "distributed.worker.preload": [_HEEDLESS],

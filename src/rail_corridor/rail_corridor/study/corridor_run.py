@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable
 from typing import Any, Final
 
@@ -13,6 +14,8 @@ from rail_corridor.scenario.model import Scenario
 from rail_corridor.stepped.corridor import SteppedCorridor
 from rail_corridor.stepped.interference import Interference
 
+#: Variable of the environment of a worker: the folder that goes with it, however it ends.
+SCRATCH: Final = "RAIL_STUDY_SCRATCH"
 #: Each such piece may take twice the time-out of a node [ticks].
 _PIECE: Final = 200
 
@@ -45,7 +48,13 @@ def report_of_run(
     """
     discover_on("none")
     with free_domain() as domain:
-        corridor = SteppedCorridor(scenario, domain=domain, timeout_s=timeout_s, intercepts=False)
+        corridor = SteppedCorridor(
+            scenario,
+            domain=domain,
+            timeout_s=timeout_s,
+            intercepts=False,
+            scratch=os.environ.get(SCRATCH),
+        )
         try:
             interference = Interference(corridor)
             for kill in sorted(kills, key=lambda kill: kill.time_s):

@@ -48,7 +48,7 @@ class LinkMarginParameters(BaseModel):
 
 
 def draw_link_margin(parameters: LinkMarginParameters, seed: int) -> Drawn:
-    """Scenario of a point, and what theory says of it.
+    """Trains at moving-block distance that come to where the train radio is weak.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gc
 import importlib
 import signal
 import subprocess
@@ -14,8 +15,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from rail_corridor.loading.loader import builtin_scenarios
+from rail_corridor.loading.loader import builtin_scenarios, load_scenario
+from rail_corridor.loading.overrides import Overrides
+from rail_corridor.study.corridor_run import report_of_run
 from rail_corridor.yaml_file import load_yaml
+from rail_msgs_py.node import CorridorMixin
 
 from .waiting import until
 
@@ -137,3 +141,16 @@ def _kill_with_children(pid: int) -> None:
         for child in (task / "children").read_text().split():
             _kill_with_children(int(child))
     subprocess.run(["kill", "-9", str(pid)], check=True)
+
+
+def test_nothing_of_a_run_stays_in_its_process() -> None:
+    scenario = load_scenario("plain_line", overrides=Overrides(duration_s=1.0))
+
+    def alive() -> list[Any]:
+        gc.collect()
+        return [each for each in gc.get_objects() if isinstance(each, CorridorMixin)]
+
+    before = len(alive())
+    for _ in range(2):
+        report_of_run(scenario)
+    assert len(alive()) == before

@@ -8,7 +8,6 @@ import importlib
 import signal
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ import yaml
 
 from rail_corridor.loading.loader import builtin_scenarios, load_scenario
 from rail_corridor.loading.overrides import Overrides
-from rail_corridor.study.corridor_run import report_of_run
+from rail_corridor.study.corridor_run import SCRATCH, report_of_run
 from rail_corridor.yaml_file import load_yaml
 from rail_msgs_py.node import CorridorMixin
 
@@ -69,23 +68,34 @@ def runs_in(folder: Path) -> int:
     return len(journal.read_text().splitlines()) - 1 if journal.exists() else 0
 
 
+def scratch_of(rail: Rail) -> Path:
+    """Return the folder for what the workers of a study leave behind."""
+    for pid in rail.processes():
+        for entry in Path(f"/proc/{pid}/environ").read_text().split("\0"):
+            name, _, value = entry.partition("=")
+            if name == SCRATCH:
+                return Path(value)
+    raise AssertionError("no worker is alive")
+
+
 def test_an_interrupted_study_goes_on_and_leaves_nothing_behind(rail: Rail, study: Path) -> None:
     folder = rail.directory / "noise.study"
-    before = {*Path(tempfile.gettempdir()).glob("rail_study_*")}
     process = rail.start("study", study, "--workers", 2)
     until(lambda: runs_in(folder) >= 3)
-    segments = rail.segments()
+    segments, scratch = rail.segments(), scratch_of(rail)
+    assert scratch.is_dir()
     process.send_signal(signal.SIGINT)
     assert rail.finish(process) == 130, rail.errors(process)
     assert "Traceback" not in rail.errors(process)
     assert 3 <= len(written(folder)) < RUNS
-    assert not rail.processes() and not segments
-    assert {*Path(tempfile.gettempdir()).glob("rail_study_*")} <= before
+    assert f" of {RUNS} runs at most; go on with --resume" in rail.output(process)
+    until(lambda: not rail.processes())
+    assert not segments and not scratch.exists()
     rows = rows_of(rail, study, "--workers", 1, "--resume")
     assert len(rows) == RUNS
     # Each row is what a run by itself gives, whoever made it.
     one = rows[7]
-    assert (one["tick_s"], one["seed"], one["ticks"]) == ("0.2", "3", "15.0")
+    assert (one["tick_s"], one["seed"], one["ticks"]) == ("0.2", "3", "15")
     data = load_yaml(builtin_scenarios()["plain_line"])
     data |= {"tick_s": 0.2, "duration_s": 3, "seed": 3}
     data["trains"][0]["start_m"] = float(one["trains.0.start_m"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
 import os
 import signal
@@ -17,7 +18,7 @@ from rich.console import Console
 
 from rail_corridor.errors import InputError
 from rail_corridor.study.cells import case_of, cells_of
-from rail_corridor.study.engine import Engine
+from rail_corridor.study.engine import Engine, LostClusterError
 from rail_corridor.study.figures import Figure
 from rail_corridor.study.journal import Entries, Entry
 from rail_corridor.study.model import Study
@@ -103,7 +104,7 @@ def test_rows_are_the_same_for_any_number_of_workers(tmp_path: Path) -> None:
     assert len({*texts}) == 1
     header, first, *_ = texts[0].splitlines()
     assert header == "study,version,cell,run,seed,scale,square,odd,failure"
-    assert first.startswith("squares,") and first.endswith(",0,0,1,1.0,1.0,1.0,")
+    assert first.startswith("squares,") and first.endswith(",0,0,1,1.0,1,1,")
     assert (tmp_path / "1" / "summary.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -132,7 +133,7 @@ def test_a_figure_that_there_is_not_is_told_before_anything_is_left(
     assert not (tmp_path / "none").exists()
 
 
-@pytest.mark.parametrize(("scale", "said"), [(1.0, "nothing has moved"), (1.001, "now 91.09")])
+@pytest.mark.parametrize(("scale", "said"), [(1.0, "nothing has moved"), (50.0, "moved: square")])
 def test_what_has_moved_is_told(tmp_path: Path, here: Where, scale: float, said: str) -> None:
     asked = study(vary={}, figures={"square": Figure(over_runs="sum")})
     console = Console(width=100, record=True, file=io.StringIO())
@@ -149,7 +150,7 @@ def test_what_fails_dies_or_hangs_is_made_once_more(client: Client, tmp_path: Pa
     asked = study(parameters={"folder": str(tmp_path)}, vary={}, first_seed=1)
     source = CalculationSource(Parameters, fragile, asked.parameters)
     cases = [case_of(asked, cells_of(asked), 0, number) for number in range(6)]
-    engine = Engine(client, source, {"square": Figure()}, 2.0, code_version(), grace_s=1.0)
+    engine = Engine(client, source, {"square": Figure()}, 2.0, code_version(), grace_s=6.0)
 
     def more(count: int) -> list[Any]:
         return [cases.pop(0) for _ in range(min(count, len(cases)))]
@@ -166,7 +167,7 @@ def test_a_worker_of_another_version_is_refused(client: Client) -> None:
     source = CalculationSource(Parameters, square)
     engine = Engine(client, source, asked.figures, 2.0, "9.9.9")
     case = case_of(asked, cells_of(asked), 0, 0)
-    with pytest.raises(InputError, match=r"a worker has version .* not 9\.9\.9"):
+    with pytest.raises(InputError, match=r"another version of the corridor than 9\.9\.9"):
         list(engine.results([case], lambda _: []))
 
 
@@ -175,3 +176,31 @@ def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--scheduler: 'tcp:nowhere'"):
         run_study(study(), source, tmp_path / "a", QUIET, "", where=Where("tcp:nowhere"))
     assert not (tmp_path / "a").exists()
+
+
+def test_a_folder_in_which_a_study_writes_is_not_taken(tmp_path: Path, here: Where) -> None:
+    out = tmp_path / "a"
+    out.mkdir()
+    held = os.open(out, os.O_RDONLY)
+    fcntl.flock(held, fcntl.LOCK_EX)
+    with pytest.raises(InputError, match=r"--out: .*another study is writing there"):
+        run(out, here)
+    os.close(held)
+    assert len(run(out, here)) == 12
+
+
+def test_a_scheduler_that_goes_is_told(tmp_path: Path) -> None:
+    asked = study(vary={})
+    source = CalculationSource(Parameters, square)
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
+        client = Client(cluster)
+        engine = Engine(client, source, asked.figures, 2.0, code_version())
+
+        def more(count: int) -> list[Any]:
+            cluster.close()
+            return [case_of(asked, cells_of(asked), 0, 1)]
+
+        case = case_of(asked, cells_of(asked), 0, 0)
+        with pytest.raises(LostClusterError, match="go on with --resume"):
+            list(engine.results([case], more))
+        client.close()

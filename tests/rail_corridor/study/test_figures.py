@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import binom, poisson
 
 from rail_corridor.errors import InputError
-from rail_corridor.study.figures import Figure, OverRuns, figure_of
+from rail_corridor.study.figures import Figure, OverRuns, figure_of, places_of
 from rail_corridor.study.intervals import estimate
 from rail_corridor.study.model import Events, HalfWidth, Stop
 from rail_corridor.study.stopping import Stopping
@@ -59,6 +59,28 @@ def test_what_must_hold_is_violated_by_what_is_not_known(figure: Figure) -> None
     assert figure.violated_by(None) and figure.violated_by(math.nan)
     assert figure.violated_by(0.5)
     assert not figure.violated_by(1.0 if figure.at_least else 0.0)
+
+
+def test_a_proportion_is_of_what_is_0_or_1() -> None:
+    figure = Figure(of="trains.*.gap_m", take="max", over_runs="proportion")
+    with pytest.raises(
+        InputError, match=r"figures\.x: .*is 3 in a run: a proportion is of what is 0"
+    ):
+        figure_of("x", figure, REPORT)
+    assert figure_of("complete", Figure(over_runs="proportion"), REPORT) == 1.0
+
+
+def test_every_place_of_a_report_is_listed_and_can_be_read() -> None:
+    places = places_of(REPORT)
+    assert places == {
+        "ticks": 10,
+        "complete": True,
+        "trains.*.gap_m": 3.0,
+        "trains.*.atp": None,
+        "trains.*.atp.trips": 2,
+    }
+    for place in places:
+        figure_of("x", Figure(of=place, take="count"), REPORT)
 
 
 def test_the_interval_of_a_proportion_is_exact() -> None:

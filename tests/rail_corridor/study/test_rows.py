@@ -10,8 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from rail_corridor.errors import InputError
-from rail_corridor.study.journal import Entries, Entry, Journal
+from rail_corridor.study.journal import Entries, Entry, Header, Journal
 from rail_corridor.study.rows import Rows, write_csv, write_parquet
+
+HEADER = Header("noise", "0123", "1.0")
 
 
 def entry(cell: int, run: int, *, failure: str | None = None, **changes: Any) -> Entry:
@@ -23,7 +25,7 @@ def entry(cell: int, run: int, *, failure: str | None = None, **changes: Any) ->
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     """Return a journal of runs that came in out of order, one of them again."""
-    journal = Journal(tmp_path / "a" / "journal.jsonl", "key", resume=False)
+    journal = Journal(tmp_path / "a" / "journal.jsonl", HEADER, resume=False)
     assert not journal.path.exists()
     for each in (
         entry(1, 0),
@@ -51,8 +53,8 @@ def test_a_line_that_was_cut_short_is_forgotten_and_one_that_is_wrong_is_told(pa
     with path.open("a") as file:
         file.write('{"cell": 4')
     assert len(Entries(path)) == 5
-    Journal(path, "key", resume=True).close()
-    journal = Journal(path, "key", resume=True)
+    Journal(path, HEADER, resume=True).close()
+    journal = Journal(path, HEADER, resume=True)
     journal.add(entry(1, 2))
     journal.close()
     assert [each.key for each in Entries(path)][-1] == (1, 2)
@@ -60,6 +62,23 @@ def test_a_line_that_was_cut_short_is_forgotten_and_one_that_is_wrong_is_told(pa
         file.write("[1, 2]\n")
     with pytest.raises(InputError, match=r"journal\.jsonl: .*is no run of a study"):
         Entries(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        (HEADER._replace(fingerprint="4567"), "is of another study, noise, or one in which"),
+        (HEADER._replace(version="1.1"), r"is of version 1\.0, and this is 1\.1: name another"),
+    ],
+)
+def test_what_another_study_or_version_has_made_is_not_gone_on_with(
+    path: Path, header: Header, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        Journal(path, header, resume=True)
+    path.write_text("cell,run\n")
+    with pytest.raises(InputError, match="is no journal of a study"):
+        Journal(path, header, resume=True)
 
 
 def test_a_csv_and_a_parquet_file_say_the_same(path: Path, tmp_path: Path) -> None:
@@ -86,7 +105,7 @@ def test_a_csv_and_a_parquet_file_say_the_same(path: Path, tmp_path: Path) -> No
 
 
 def test_values_of_several_kinds_are_texts(tmp_path: Path) -> None:
-    journal = Journal(tmp_path / "journal.jsonl", "key", resume=False)
+    journal = Journal(tmp_path / "journal.jsonl", HEADER, resume=False)
     for run, value in enumerate((1, 2.5, None, "all", [1, 2])):
         journal.add(entry(0, run, tick_s=value))
     journal.close()

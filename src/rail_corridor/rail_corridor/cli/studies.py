@@ -74,6 +74,9 @@ def study(
             "--only", help="Make one run of one cell here, and show it.", metavar="CELL:RUN"
         ),
     ] = None,
+    figures: Annotated[
+        bool, typer.Option("--figures", help="Show the places that figures can be of.")
+    ] = False,
     compare: Annotated[
         Path | None,
         typer.Option(
@@ -84,10 +87,11 @@ def study(
     """Make many runs of one question: rows, a summary with intervals, a picture."""
     from rich.console import Console
 
+    from rail_corridor.errors import InputError
     from rail_corridor.studies.registry import CALCULATIONS, FOLDER, GENERATORS
     from rail_corridor.study.engine import LostClusterError
     from rail_corridor.study.run_study import Where, run_study
-    from rail_corridor.study.single_run import show_run
+    from rail_corridor.study.single_run import show_places, show_run
     from rail_corridor.study.study_file import list_studies, load_study
 
     console = Console()
@@ -98,6 +102,9 @@ def study(
     changes = {key: value for key, value in given.items() if value is not None}
     changes |= assignments("--set", fields or ())
     loaded, source = load_study(what, FOLDER, GENERATORS, CALCULATIONS, changes)
+    if figures:
+        show_places(loaded, source, console)
+        return
     if only is not None:
         raise typer.Exit(show_run(loaded, source, only, console))
     repeated = ["rail", "study", what, *(["--seed", str(seed)] if seed is not None else [])]
@@ -107,6 +114,8 @@ def study(
         raise UsageError(f"--out: {folder}: is not a directory")
     check_writable("--out", (folder if folder.is_dir() else folder.parent) / "any")
     signal.signal(signal.SIGTERM, _leave)
+    if workers is not None and scheduler is not None:
+        raise UsageError("--workers: are those of the scheduler, where one is named")
     try:
         code = run_study(
             loaded,
@@ -118,6 +127,10 @@ def study(
             resume=resume,
             compare=compare,
         )
+    except InputError as error:
+        raise (error.located(what) if error.field.startswith("figures.") else error) from None
+    except OSError as error:
+        raise UsageError(f"{error.filename}: {(error.strerror or str(error)).lower()}") from None
     except LostClusterError as error:
         print(f"rail: {error}", file=sys.stderr)
         code = 1

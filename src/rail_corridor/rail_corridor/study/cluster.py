@@ -41,7 +41,8 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
 
     untyped: Any = distributed
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "tornado", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if scheduler is not None:
         try:
             client = untyped.Client(scheduler, timeout=_PATIENCE_S)

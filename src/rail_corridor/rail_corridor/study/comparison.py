@@ -25,8 +25,9 @@ def moves(
 ) -> tuple[int, list[Move]]:
     """Groups that are in both, and figures whose intervals there do not overlap.
 
-    Without an interval, any that differ have moved.
+    Without an interval, any that differ have moved, if both are of as many runs.
     """
+    ungauged = [name for name, figure in figures.items() if figure.over_runs in ("min", "max")]
     found = []
     compared = 0
     old = {tuple(map(str, group.key)): group for group in before}
@@ -37,6 +38,8 @@ def moves(
         compared += 1
         for name in figures:
             a, b = other.estimates[name], group.estimates[name]
+            if name in ungauged and a.runs != b.runs:
+                continue  # the least of more runs is less
             if _apart(a, b):
                 found.append(Move(group.key, name, a, b))
     return compared, found

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Pair = tuple[float, float]
+_FURTHEST: Final = 2**53
 
 
 class Draw(BaseModel):
@@ -40,14 +41,20 @@ class Draw(BaseModel):
         elif name == "normal":
             if not values[1] >= 0.0:
                 raise ValueError("normal: the standard deviation must not be below 0")
+        elif name == "integers" and not -_FURTHEST <= values[0] <= values[1] <= _FURTHEST:
+            raise ValueError(f"integers: must be two in order, from {-_FURTHEST} to {_FURTHEST}")
         elif not values[0] <= values[1] or (name == "log_uniform" and not values[0] > 0.0):
             raise ValueError(f"{name}: must be two values in order")
         return self
 
     def extremes(self) -> tuple[Any, ...]:
-        """Values that show whether all can be: the ends of a range, the mean, each choice."""
+        """Values that show whether all can be: the ends of a range, each choice.
+
+        Of a normal law those three deviations off the mean.
+        """
         if self.normal is not None:
-            return self.normal[:1]
+            mean, sigma = self.normal
+            return mean - 3.0 * sigma, mean + 3.0 * sigma
         (given,) = self.model_dump(exclude_none=True).values()
         return tuple(given)
 

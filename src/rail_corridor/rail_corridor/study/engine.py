@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from importlib import metadata
 from typing import Any, Final, NamedTuple
@@ -26,6 +27,7 @@ from .version import code_version
 _WORTH_S: Final = 0.5
 _MOST_TOGETHER: Final = 500
 _LOOK_S: Final = 0.5
+_LOST: Final = "the scheduler has gone: go on with --resume"
 
 More = Callable[[int], list[Case]]
 
@@ -56,8 +58,10 @@ def make_cases(
         If the worker has other code: its rows would not be those of the others.
     """
     if code_version() != version:
-        reason = f"a worker has version {code_version()} of the corridor, not {version}"
-        raise InputError(reason, field="--scheduler")
+        reason = (
+            f"a worker has another version of the corridor than {version}, which began the study"
+        )
+        raise InputError(reason, field="version", value=code_version())
     return [_make(source, figures, case) for case in cases]
 
 
@@ -105,7 +109,7 @@ class Engine:
         figures: Mapping[str, Figure],
         timeout_s: float,
         version: str,
-        grace_s: float = 30.0,
+        grace_s: float = 10.0,
     ) -> None:
         self._client, self._source, self._figures = client, source, figures
         self._timeout_s, self._grace_s, self._version = timeout_s, grace_s, version
@@ -161,13 +165,21 @@ class Engine:
         LostClusterError
             If the scheduler has gone.
         """
-        if first:
-            self._send(first)
-        while True:
-            self._fill(more)
-            if not self._under_way:
-                return
-            yield from self._come_in()
+        try:
+            if first:
+                self._send(first)
+            while True:
+                self._fill(more)
+                if not self._under_way:
+                    return
+                yield from self._come_in()
+        except (InputError, LostClusterError):
+            raise
+        except Exception as error:
+            # Which error it is depends on the call that has noticed it.
+            if isinstance(error, CancelledError | OSError) or self._client.status != "running":
+                raise LostClusterError(_LOST) from error
+            raise
 
     def _fill(self, more: More) -> None:
         """Send cases until every worker has something to do."""
@@ -203,7 +215,7 @@ class Engine:
         except distributed.TimeoutError:
             done = set()
         if self._client.status != "running":
-            raise LostClusterError("the scheduler has gone: go on with --resume")
+            raise LostClusterError(_LOST)
         for future in done:
             task = self._under_way.pop(future)
             error = None if future.status == "finished" else future.exception()

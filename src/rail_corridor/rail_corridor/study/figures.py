@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -12,6 +12,8 @@ from rail_corridor.errors import InputError, did_you_mean
 
 Take = Literal["value", "sum", "min", "max", "mean", "count"]
 OverRuns = Literal["mean", "sum", "min", "max", "median", "p90", "p95", "proportion", "rate"]
+
+_MOST_NAMED: Final = 8
 
 
 class Figure(BaseModel):
@@ -29,12 +31,14 @@ class Figure(BaseModel):
         None, description="figure whose sum that of this one is divided by: proportion, rate"
     )
     beside: str | None = Field(None, description="figure in whose diagram it is drawn, as theory")
-    must_be: float | None = Field(None, description="verdict: in every run")
-    at_least: float | None = Field(None, description="verdict: in every run")
-    at_most: float | None = Field(None, description="verdict: in every run")
+    must_be: float | None = Field(None, allow_inf_nan=False, description="verdict: in every run")
+    at_least: float | None = Field(None, allow_inf_nan=False, description="verdict: in every run")
+    at_most: float | None = Field(None, allow_inf_nan=False, description="verdict: in every run")
 
     @model_validator(mode="after")
-    def _divides_what_can_be(self) -> Figure:
+    def _can_be(self) -> Figure:
+        if None not in (self.at_least, self.at_most) and self.at_least > self.at_most:  # type: ignore[operator]
+            raise ValueError("at_least: is more than at_most")
         if self.per is None and self.over_runs == "rate":
             raise ValueError("per: a rate needs the figure that it is a rate of")
         if self.per is not None and self.over_runs not in ("proportion", "rate"):
@@ -64,6 +68,16 @@ def figure_of(name: str, figure: Figure, report: Mapping[str, Any]) -> float | N
     place = figure.of or name
     found = list(_at(report, place.split("."), f"figures.{name}", place))
     values = [float(value) for value in found if isinstance(value, bool | int | float)]
+    value = _taken(name, figure, place, found, values)
+    if figure.over_runs == "proportion" and figure.per is None and value not in (None, 0.0, 1.0):
+        reason = f"is {value:g} in a run: a proportion is of what is 0 or 1, or per another figure"
+        raise InputError(reason, field=f"figures.{name}", value=place)
+    return value
+
+
+def _taken(
+    name: str, figure: Figure, place: str, found: Sequence[Any], values: Sequence[float]
+) -> float | None:
     match figure.take:
         case "count":
             return float(len([value for value in found if value is not None]))
@@ -102,6 +116,25 @@ def _at(value: Any, path: Sequence[str], field: str, whole: str) -> Iterator[Any
             yield from _at(each, rest, field, whole)
         return
     if key not in inside:
-        reason = f"the report has no {key} there{did_you_mean(key, map(str, inside))}"
+        near = did_you_mean(key, map(str, inside))
+        there = ", ".join(list(map(str, inside))[:_MOST_NAMED])
+        reason = f"the report has no {key} there{near or f'; there are {there}' if there else ''}"
         raise InputError(reason, field=field, value=whole)
     yield from _at(inside[key], rest, field, whole)
+
+
+def places_of(report: Mapping[str, Any]) -> dict[str, Any]:
+    """Places of a report that a figure can be of, and what stands there, of several one."""
+    found: dict[str, Any] = {}
+
+    def look(value: Any, place: str, several: bool) -> None:
+        if isinstance(value, Mapping | list):
+            many = several or isinstance(value, list)
+            items = enumerate(value) if isinstance(value, list) else value.items()
+            for key, each in items:
+                look(each, f"{place}{'*' if many else key}.", place == "" and key == "trains")
+        elif not isinstance(value, str) and found.get(place[:-1]) is None:
+            found[place[:-1]] = value
+
+    look(report, "", False)
+    return found

@@ -13,14 +13,16 @@ from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rail_corridor.errors import InputError
 
+from .cells import case_of, cells_of
 from .model import Study
+from .sources import Source
 
 _Places = NDArray[np.int64]
 
@@ -44,11 +46,37 @@ class Entry:
         return self.cell, self.run
 
 
-def fingerprint(study: Study, version: str) -> str:
-    """Of all that decides what a run gives: not of how many are wanted, or when it is enough."""
-    content = study.model_dump(mode="json", exclude={"runs", "stop", "description", "group_by"})
-    text = json.dumps([content, version], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+class Header(NamedTuple):
+    """First line of a journal: whose it is, and by what version of the code.
+
+    Parameters
+    ----------
+    name : str
+    fingerprint : str
+        Of all that decides what a run gives: not of how many are wanted, or when it is enough.
+    version : str
+    """
+
+    name: str
+    fingerprint: str
+    version: str
+
+    @classmethod
+    def of(cls, study: Study, source: Source, version: str) -> Header:
+        """That of a study."""
+        asked = study.model_dump(mode="json", exclude={"runs", "stop", "description", "group_by"})
+        first = case_of(study, cells_of(study), 0, 0)
+        text = json.dumps([asked, source.content(first.values, first.seed)], sort_keys=True)
+        return cls(study.name, hashlib.sha256(text.encode()).hexdigest()[:16], version)
+
+
+def header_of(path: Path) -> Header:
+    """First line of a journal; InputError if it is none."""
+    try:
+        with path.open() as file:
+            return Header(**json.loads(file.readline()))
+    except (ValueError, TypeError):
+        raise InputError("is no journal of a study", file=str(path)) from None
 
 
 class Journal:
@@ -57,8 +85,7 @@ class Journal:
     Parameters
     ----------
     path : Path
-    key : str
-        Of `fingerprint`.
+    header : Header
     resume : bool
         Whether to go on with what there is.
 
@@ -68,15 +95,16 @@ class Journal:
         If there is one, and it is not to be gone on with, or of another study.
     """
 
-    def __init__(self, path: Path, key: str, *, resume: bool) -> None:
-        self.path, self._key = path, key
+    def __init__(self, path: Path, header: Header, *, resume: bool) -> None:
+        self.path, self._header = path, header
         self._file: TextIO | None = None
         self._kept: int | None = None
-        if path.exists():
+        if path.exists() and path.stat().st_size:
             if not resume:
                 reason = "there are runs already: go on with --resume, or name another --out"
                 raise InputError(reason, field="--out", value=str(path.parent))
-            self._kept = _whole_lines(path, key)
+            _check_header(path, header)
+            self._kept = path.read_bytes().rfind(b"\n") + 1
 
     def add(self, entry: Entry) -> None:
         """Write a run; it is on its way to the disk when this returns."""
@@ -87,7 +115,7 @@ class Journal:
     def _open(self) -> TextIO:
         if self._kept is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.path.write_text(json.dumps({"study": self._key}) + "\n")
+            self.path.write_text(json.dumps(self._header._asdict()) + "\n")
         else:
             with self.path.open("r+b") as file:
                 file.truncate(self._kept)
@@ -100,17 +128,14 @@ class Journal:
             self._file.close()
 
 
-def _whole_lines(path: Path, key: str) -> int:
-    """Length of the whole lines of the journal of a study [byte]."""
-    raw = path.read_bytes()
-    try:
-        found = json.loads(raw[: raw.index(b"\n")])["study"]
-    except (ValueError, KeyError, TypeError):
-        raise InputError("is no journal of a study", file=str(path)) from None
-    if found != key:
-        reason = "is of another study, or of another version: name another --out"
-        raise InputError(reason, file=str(path))
-    return raw.rfind(b"\n") + 1
+def _check_header(path: Path, wanted: Header) -> None:
+    found = header_of(path)
+    if found.fingerprint != wanted.fingerprint:
+        reason = f"is of another study, {found.name}, or one in which figures or values were others"
+        raise InputError(f"{reason}: name another --out", file=str(path))
+    if found.version != wanted.version:
+        reason = f"is of version {found.version}, and this is {wanted.version}"
+        raise InputError(f"{reason}: name another --out", file=str(path))
 
 
 class Entries:
@@ -183,12 +208,23 @@ def _lines(path: Path) -> Iterator[tuple[int, Entry]]:
         for line in file:
             if line.endswith(b"\n"):
                 try:
-                    entry = Entry(**json.loads(line))
+                    entry = _entry(json.loads(line))
                 except (ValueError, TypeError):
-                    reason = "is no run of a study"
-                    raise InputError(reason, file=str(path), value=f"byte {place}") from None
+                    reason = f"what stands at byte {place} is no run of a study"
+                    raise InputError(reason, file=str(path)) from None
                 yield place, entry
             place += len(line)
+
+
+def _entry(data: Any) -> Entry:
+    entry = Entry(**data)
+    numbers = (entry.cell, entry.run, entry.seed)
+    parts = (entry.values, entry.facts, entry.figures)
+    if not all(type(n) is int and n >= 0 for n in numbers) or not all(
+        isinstance(part, dict) for part in parts
+    ):
+        raise ValueError(data)
+    return entry
 
 
 def _plain(value: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -10,6 +11,8 @@ from .draws import Draw
 from .figures import Figure
 
 _NAME = r"^[a-z][a-z0-9_]*$"
+#: Columns that every study has.
+RESERVED = ("study", "version", "cell", "run", "seed", "failure")
 
 
 class HalfWidth(BaseModel):
@@ -73,7 +76,7 @@ class Study(BaseModel):
     group_by: tuple[str, ...] | None = Field(
         None, description="columns of the summary; those of cells and vary if not said"
     )
-    timeout_s: float = Field(900.0, gt=0.0, description="wall time of one run")
+    timeout_s: float = Field(900.0, gt=0.0, allow_inf_nan=False, description="wall time of one run")
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -94,6 +97,8 @@ class Study(BaseModel):
 
     @model_validator(mode="after")
     def _has_cells(self) -> Study:
+        if self.cells and not self.cells[0]:
+            raise ValueError("cells.0: there is nothing in it")
         for number, cell in enumerate(self.cells):
             for name in {*cell} ^ {*self.cells[0]}:
                 raise ValueError(f"cells.{number}: all must set the same, not only some {name}")
@@ -108,10 +113,24 @@ class Study(BaseModel):
         return self
 
     @model_validator(mode="after")
+    def _leaves_the_seed(self) -> Study:
+        for part, names in (
+            ("parameters", self.parameters),
+            ("cells", self.cells[0] if self.cells else ()),
+            ("vary", self.vary),
+            ("draw", self.draw),
+        ):
+            if "seed" in names:
+                raise ValueError(f"{part}.seed: is first_seed and the number of the run")
+        return self
+
+    @model_validator(mode="after")
     def _has_figures(self) -> Study:
         if not self.figures and self.calculation is None:
             raise ValueError("figures: at least one is needed")
         for name, figure in self.figures.items():
+            if not re.fullmatch(_NAME, name) or name in RESERVED or name in self.varied:
+                raise ValueError(f"figures.{name}: is no name of a figure, or one of a column")
             for key, other in (("per", figure.per), ("beside", figure.beside)):
                 if other is not None and other not in self.figures:
                     raise ValueError(f"figures.{name}.{key}: is none of the figures")

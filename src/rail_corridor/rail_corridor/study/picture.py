@@ -22,7 +22,11 @@ _DECADES: Final = 30.0
 
 
 def draw_study(path: Path, study: Study, groups: Sequence[Group], names: Sequence[str]) -> None:
-    """Draw one small diagram for each figure, and in it as a dashed line what is beside it."""
+    """Draw one small diagram for each figure, and in it as a dashed line what is beside it.
+
+    What is the same in all groups is left out, unless there is nothing else.
+    """
+    names = [name for name in names if _differs(name, groups)] or list(names)
     wide = min(_WIDE, len(names))
     high = math.ceil(len(names) / wide)
     style: Any = STYLE
@@ -65,13 +69,16 @@ def _draw(
             if figure.beside == name:
                 y = [group.estimates[other].value for group in line]
                 axes.plot(x, y, "--", color=colour, linewidth=1.0)
+                note = f"dashed: {other.replace('_', ' ')}"
+                axes.annotate(note, (0.02, 0.97), xycoords="axes fraction", va="top", fontsize=8)
     positive = [value for value in values if value > 0.0]
     is_rate = figures[name].over_runs in ("proportion", "rate")
     if is_rate and positive and max(positive) > _DECADES * min(positive):
         axes.set_yscale("log")
     if by and not numeric:
         axes.set_xticks(range(len(names)), names, rotation=30, ha="right")
-    axes.set_title(name.replace("_", " "))
+    how = figures[name].over_runs
+    axes.set_title(name.replace("_", " ") + ("" if how == "mean" else f" ({how})"))
     axes.set_xlabel(_short(by[0]).replace("_", " ") if by else "")
 
 
@@ -95,6 +102,11 @@ def _points(
         x, values, yerr=reach, fmt=style, ms=3.5, capsize=2, color=colour, label=label or name
     )
     return values
+
+
+def _differs(name: str, groups: Sequence[Group]) -> bool:
+    values = {group.estimates[name].value for group in groups}
+    return len({value for value in values if not math.isnan(value)}) > 1
 
 
 def _is_number(value: object) -> bool:

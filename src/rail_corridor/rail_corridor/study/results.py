@@ -13,7 +13,7 @@ from rail_corridor.errors import InputError
 
 from .comparison import moves
 from .figures import Figure
-from .journal import Entries, Entry
+from .journal import Entries, Entry, header_of
 from .model import Study
 from .picture import draw_study
 from .rows import Rows, has_parquet, write_csv, write_parquet
@@ -64,7 +64,7 @@ def conclude(
         write_parquet(out / "rows.parquet", out / "rows.csv", rows, entries)
     names = [name for name, figure in study.figures.items() if figure.beside is None]
     total = total_of(groups, entries, study)
-    print_summary(study.name, groups, study.columns, list(study.figures), console, total)
+    print_summary(study, groups, console, total)
     draw_study(out / "summary.png", study, groups, names)
     told = list(islice(violations, _MOST_TOLD))
     for violation in told:
@@ -89,19 +89,30 @@ def _again(command: str, entry: Entry) -> str:
     return f"{command} --only {entry.cell}:{entry.run}"
 
 
-def entries_of(folder: Path) -> Entries:
-    """Runs of an earlier study; InputError if there are none in a folder."""
+def entries_of(folder: Path, name: str) -> Entries:
+    """Runs of an earlier study of that name; InputError if there are none in a folder."""
     path = folder / JOURNAL
     if not path.is_file():
         raise InputError(f"there is no {JOURNAL}", field="--compare", value=str(folder))
+    found = header_of(path).name
+    if found != name:
+        reason = f"is of the study {found}, and this is {name}"
+        raise InputError(reason, field="--compare", value=str(folder))
     return Entries(path)
 
 
 def print_moves(before: Entries, now: StudyOutcome, console: Console) -> bool:
     """Show which figures have moved beyond their intervals; whether any has."""
     study = now.study
-    old = groups_of(before, study.columns, study.figures)
-    compared, found = moves(old, now.groups, study.figures)
+    # A sum grows with the runs; what can be compared is what it is in one.
+    figures = {
+        name: figure.model_copy(update={"over_runs": "mean"})
+        if figure.over_runs == "sum"
+        else figure
+        for name, figure in study.figures.items()
+    }
+    old = groups_of(before, study.columns, figures)
+    compared, found = moves(old, groups_of(now.entries, study.columns, figures), figures)
     for move in found:
         key = zip(study.columns, move.key, strict=True)
         where = ", ".join(f"{name} {value}" for name, value in key)

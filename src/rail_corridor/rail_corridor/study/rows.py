@@ -43,9 +43,14 @@ class Rows:
             *(self._study, self._version, *entry.key, entry.seed),
             *(entry.values.get(name) for name in self.values),
             *(entry.facts.get(name) for name in self.facts),
-            *(entry.figures.get(name) for name in self.figures),
+            *(_short(entry.figures.get(name)) for name in self.figures),
             entry.failure,
         ]
+
+
+def _short(value: float | None) -> float | None:
+    """A count as one: 12, not 12.0."""
+    return int(value) if value is not None and float(value).is_integer() else value
 
 
 def write_csv(path: Path, rows: Rows, entries: Iterable[Entry]) -> None:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import cycle
 from pathlib import Path
 from typing import NamedTuple
 
 from rich.console import Console
 
+from rail_corridor.errors import InputError
+
 from .cells import Case, case_of, cells_of
 from .cluster import client_of
 from .engine import Engine
-from .journal import Entries, Entry, Journal, fingerprint
+from .journal import Entries, Entry, Header, Journal
 from .model import Study
 from .progress import progress
 from .results import JOURNAL, conclude, entries_of, print_moves
@@ -27,6 +33,24 @@ class Where(NamedTuple):
     workers: int | None = None
 
 
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Hold a folder, which is made, against other studies; one that stays empty goes again."""
+    folder.mkdir(exist_ok=True)
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            reason = "another study is writing there"
+            raise InputError(reason, field="--out", value=str(folder)) from None
+        yield
+    finally:
+        os.close(held)
+        if not any(folder.iterdir()):
+            folder.rmdir()
+
+
 class _Cells:
     """Which case comes next: cell after cell in turn, each until it has had enough."""
 
@@ -35,16 +59,21 @@ class _Cells:
         self.rules = [Stopping(study.stop, study.figures, study.runs) for _ in self._cells]
         self._next = [0] * len(self._cells)
         self._turn = cycle(range(len(self._cells)))
-        self._made: set[tuple[int, int]] = set()
+        self._earlier: set[tuple[int, int]] = set()
+        #: Runs that have ended, now or before.
+        self.made = 0
 
     def take(self, entry: Entry) -> None:
         """A run has ended."""
+        self.made += 1
         self.rules[entry.cell].add(entry.run, None if entry.failure else entry.figures)
 
     def take_earlier(self, entry: Entry) -> None:
         """A run has ended before the study was gone on with; one that failed is made again."""
+        if entry.cell >= len(self._cells):
+            raise InputError(f"there is no cell {entry.cell} in the study", file=JOURNAL)
         if entry.failure is None:
-            self._made.add(entry.key)
+            self._earlier.add(entry.key)
             self.take(entry)
 
     def more(self, count: int) -> list[Case]:
@@ -54,7 +83,7 @@ class _Cells:
         while len(cases) < count and idle < len(self._cells):
             cell = next(self._turn)
             run = self._next[cell]
-            while (cell, run) in self._made:
+            while (cell, run) in self._earlier:
                 run += 1
             if self.rules[cell].ended is not None or run >= self._study.runs:
                 idle += 1
@@ -75,9 +104,9 @@ class _Cells:
         return sum(rule.ended or self._study.runs for rule in self.rules)
 
     @property
-    def made(self) -> int:
-        """Runs that were made before."""
-        return len(self._made)
+    def over(self) -> bool:
+        """Whether every cell has had enough."""
+        return all(rule.ended is not None for rule in self.rules)
 
 
 def run_study(
@@ -115,28 +144,46 @@ def run_study(
     LostClusterError
         If the scheduler has gone.
     """
-    before = None if compare is None else entries_of(compare)
+    before = None if compare is None else entries_of(compare, study.name)
+    with _alone_in(out):
+        moved = _run(study, source, out, console, command, where or Where(), resume, before)
+    return moved
+
+
+def _run(
+    study: Study,
+    source: Source,
+    out: Path,
+    console: Console,
+    command: str,
+    where: Where,
+    resume: bool,
+    before: Entries | None,
+) -> int:
     code = code_version()
-    journal = Journal(out / JOURNAL, fingerprint(study, code), resume=resume)
+    journal = Journal(out / JOURNAL, Header.of(study, source, code), resume=resume)
     cells = _Cells(study)
     for entry in Entries(journal.path):
         cells.take_earlier(entry)
     try:
-        with progress(console, study.name) as show, client_of(*(where or Where())) as client:
+        with progress(console, study.name) as show, client_of(*where) as client:
             engine = Engine(client, source, study.figures, study.timeout_s, code)
             first = cells.more(1)
             if first:
                 engine.try_out(first[0])
-            done, failed = cells.made, 0
+            failed = 0
             for entry in engine.results(first, cells.more):
                 journal.add(entry)
                 cells.take(entry)
-                done, failed = done + 1, failed + (entry.failure is not None)
-                show(done, failed, engine.running, cells.wanted)
+                failed += entry.failure is not None
+                show(cells.made, failed, engine.running, cells.wanted)
     finally:
         journal.close()
         if journal.path.exists():
             counting = Entries(journal.path, cells.ended)
             outcome = conclude(study, counting, out, code, console, command)
+        if not cells.over:
+            said = f"not over: {cells.made} of {cells.wanted} runs at most; go on with --resume"
+            console.print(f"[yellow]{said}[/yellow]", soft_wrap=True)
     moved = before is not None and print_moves(before, outcome, console)
     return 1 if outcome.violations or outcome.failed or moved else 0

@@ -1,4 +1,4 @@
-"""One run of a study by itself: for those who look into one that has failed."""
+"""One run of a study by itself: for those who look into it, or look for figures."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from rich.console import Console
 from rail_corridor.errors import InputError
 
 from .cells import case_of, cells_of
+from .figures import places_of
 from .model import Study
 from .sources import Source
 
@@ -38,3 +39,12 @@ def show_run(study: Study, source: Source, place: str, console: Console) -> int:
         wrong |= bad
         console.print(f"[{'red' if bad else 'default'}]{name}: {value}[/]", soft_wrap=True)
     return 1 if wrong else 0
+
+
+def show_places(study: Study, source: Source, console: Console) -> None:
+    """Show what figures can be of, from the first tick of the first run."""
+    case = case_of(study, cells_of(study), 0, 0)
+    _, report = source.report(case.values, case.seed, ticks=1 if source.has_ticks else None)
+    for place, value in places_of(report).items():
+        shown = "" if value is None else f"[dim]{value}[/dim]"
+        console.print(f"{place}  {shown}", soft_wrap=True, highlight=False)

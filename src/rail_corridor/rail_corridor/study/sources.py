@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
@@ -26,21 +28,39 @@ class Outcome(NamedTuple):
     figures: dict[str, float | None]
 
 
-class Source(Protocol):
+class Source(ABC):
     """Where runs come from; goes to the workers as it is."""
 
+    #: Whether a run can be begun only: a calculation cannot.
+    has_ticks: ClassVar[bool] = True
+
+    @abstractmethod
     def check(self, values: Mapping[str, Any], seed: int) -> None:
         """Raise InputError for values that there cannot be; starts nothing."""
 
-    def try_out(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> None:
-        """Raise InputError for figures that a run does not have, by the first tick of one."""
+    @abstractmethod
+    def content(self, values: Mapping[str, Any], seed: int) -> str:
+        """What a run is a run of, with all that files say: of another content are other runs."""
+
+    @abstractmethod
+    def report(
+        self, values: Mapping[str, Any], seed: int, ticks: int | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What was drawn for a run, by column, and its report; of its first ticks if so many."""
 
     def run(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> Outcome:
         """Make a run; the same for the same arguments wherever it is made."""
+        facts, report = self.report(values, seed)
+        return Outcome(facts, found(figures, report) if figures else report)
+
+    def try_out(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> None:
+        """Raise InputError for figures that a run does not have, by the first tick of one."""
+        if self.has_ticks:
+            found(figures, self.report(values, seed, ticks=1)[1])
 
 
 @dataclass(frozen=True)
-class ScenarioSource:
+class ScenarioSource(Source):
     """A scenario some of whose fields vary.
 
     Parameters
@@ -49,22 +69,27 @@ class ScenarioSource:
         As of its file.
     directory : Path
         What file names in it are relative to.
+    file : str
+        Its own; empty if it stands in the study.
     """
 
     data: Mapping[str, Any]
     directory: Path
+    file: str = ""
 
     def check(self, values: Mapping[str, Any], seed: int) -> None:
         """See `Source`."""
         self._scenario(values, seed)
 
-    def try_out(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> None:
+    def report(
+        self, values: Mapping[str, Any], seed: int, ticks: int | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         """See `Source`."""
-        found(figures, report_of_run(self._scenario(values, seed), ticks=1))
+        return {}, report_of_run(self._scenario(values, seed), ticks=ticks)
 
-    def run(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> Outcome:
+    def content(self, values: Mapping[str, Any], seed: int) -> str:
         """See `Source`."""
-        return Outcome({}, found(figures, report_of_run(self._scenario(values, seed))))
+        return str(self._scenario(values, seed).to_json())
 
     def _scenario(self, values: Mapping[str, Any], seed: int) -> Any:
         data = with_fields(self.data, {**values, "seed": seed})
@@ -80,7 +105,7 @@ class Drawn(NamedTuple):
 
 
 @dataclass(frozen=True)
-class GeneratorSource:
+class GeneratorSource(Source):
     """Scenarios that are drawn from a seed.
 
     Parameters
@@ -105,14 +130,6 @@ class GeneratorSource:
         """See `Source`."""
         scenario_from_data(self.drawn(values, seed).data, directory=Path.cwd())
 
-    def try_out(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> None:
-        """See `Source`."""
-        self._outcome(values, seed, figures, ticks=1)
-
-    def run(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> Outcome:
-        """See `Source`."""
-        return self._outcome(values, seed, figures)
-
     def drawn(self, values: Mapping[str, Any], seed: int) -> Drawn:
         """The scenario of a seed.
 
@@ -123,22 +140,23 @@ class GeneratorSource:
         """
         return self.draw(checked(self.parameters, {**self.fixed, **values}), seed)
 
-    def _outcome(
-        self,
-        values: Mapping[str, Any],
-        seed: int,
-        figures: Mapping[str, Figure],
-        ticks: int | None = None,
-    ) -> Outcome:
+    def report(
+        self, values: Mapping[str, Any], seed: int, ticks: int | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """See `Source`."""
         drawn = self.drawn(values, seed)
         scenario = scenario_from_data(drawn.data, directory=Path.cwd())
         report = report_of_run(scenario, kills=drawn.kills, ticks=ticks)
         report["drawn"] = {**drawn.facts, **(self.look(drawn, report) if self.look else {})}
-        return Outcome(dict(drawn.facts), found(figures, report))
+        return dict(drawn.facts), report
+
+    def content(self, values: Mapping[str, Any], seed: int) -> str:
+        """See `Source`."""
+        return json.dumps(self.drawn(values, seed).data)
 
 
 @dataclass(frozen=True)
-class CalculationSource:
+class CalculationSource(Source):
     """A calculation that needs no corridor.
 
     Parameters
@@ -152,21 +170,22 @@ class CalculationSource:
     parameters: type[BaseModel]
     calculate: Callable[[Any, int], Mapping[str, float | None]]
     fixed: Mapping[str, Any] = field(default_factory=dict)
+    has_ticks: ClassVar[bool] = False
 
     def check(self, values: Mapping[str, Any], seed: int) -> None:
         """See `Source`."""
         checked(self.parameters, {**self.fixed, **values})
 
-    def try_out(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> None:
-        """See `Source`: a calculation cannot be begun only."""
-
-    def run(self, values: Mapping[str, Any], seed: int, figures: Mapping[str, Figure]) -> Outcome:
+    def report(
+        self, values: Mapping[str, Any], seed: int, ticks: int | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         """See `Source`."""
         given = self.calculate(checked(self.parameters, {**self.fixed, **values}), seed)
-        report = {name: None if each is None else float(each) for name, each in given.items()}
-        if not figures:
-            return Outcome({}, report)
-        return Outcome({}, found(figures, report))
+        return {}, {name: None if each is None else float(each) for name, each in given.items()}
+
+    def content(self, values: Mapping[str, Any], seed: int) -> str:
+        """See `Source`: the version of the code tells the rest."""
+        return ""
 
 
 def found(figures: Mapping[str, Figure], report: Mapping[str, Any]) -> dict[str, float | None]:

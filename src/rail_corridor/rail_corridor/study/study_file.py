@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 from rich.console import Console
@@ -19,6 +19,9 @@ from .cells import case_of, cells_of
 from .fields import with_fields
 from .model import Study
 from .sources import CalculationSource, GeneratorSource, ScenarioSource, Source, relative
+
+#: Parts of a study whose keys are fields of what it runs.
+_OF_FIELDS: Final = ("parameters", "vary", "draw")
 
 
 def load_study(
@@ -48,7 +51,7 @@ def load_study(
     """
     path = _find(name_or_path, folder)
     try:
-        data = with_fields(load_yaml(path), overrides or {})
+        data = _changed(load_yaml(path), overrides or {})
         try:
             study = Study.model_validate(data)
         except ValidationError as error:
@@ -58,6 +61,18 @@ def load_study(
     except InputError as error:
         raise error.located(str(path)) from None
     return study, source
+
+
+def _changed(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """A study with other values; names of a scenario's fields in it have dots of their own."""
+    changed = dict(data)
+    for name, value in overrides.items():
+        section, _, field = name.partition(".")
+        if field and section in _OF_FIELDS and isinstance(changed.get(section, {}), dict):
+            changed[section] = {**changed.get(section, {}), field: value}
+        else:
+            changed = with_fields(changed, {name: value})
+    return changed
 
 
 def list_studies(folder: Path, console: Console) -> None:
@@ -92,8 +107,10 @@ def _source_of(
         known: CalculationSource = _named(study.calculation, calculations, "calculation")
         return replace(known, fixed=study.parameters)
     assert study.scenario is not None
-    data, directory = _scenario_data(study.scenario, directory)
-    return ScenarioSource(with_fields(data, study.parameters), directory)
+    data, path = _scenario_data(study.scenario, directory)
+    file = "" if path.is_dir() else str(path)
+    folder = path if path.is_dir() else path.parent
+    return ScenarioSource(with_fields(data, study.parameters), folder, file)
 
 
 def _named(name: str, known: Mapping[str, Any], field: str) -> Any:
@@ -106,16 +123,15 @@ def _named(name: str, known: Mapping[str, Any], field: str) -> Any:
 def _scenario_data(
     scenario: str | dict[str, Any], directory: Path
 ) -> tuple[Mapping[str, Any], Path]:
+    """A scenario as plain data, and its file; the folder of the study if it stands in that."""
     if isinstance(scenario, dict):
         return scenario, directory
     builtin = builtin_scenarios()
-    if scenario in builtin:
-        return load_yaml(builtin[scenario]), builtin[scenario].parent
-    path = directory / scenario
+    path = builtin.get(scenario, directory / scenario)
     if not path.is_file():
         reason = f"is neither built in nor beside the study{did_you_mean(scenario, builtin)}"
         raise InputError(reason, field="scenario", value=scenario)
-    return load_yaml(path), path.parent
+    return load_yaml(path), path
 
 
 def _check(study: Study, source: Source) -> None:
@@ -127,6 +143,7 @@ def _check(study: Study, source: Source) -> None:
         **{name: f"draw.{name}" for name in study.draw},
     }
     first = dict(case_of(study, cells_of(study), 0, 0).values)
+    first |= {name: law.extremes()[0] for name, law in study.draw.items()}
     changes: list[Mapping[str, Any]] = [{}, *study.cells[1:]]
     changes += [{name: value} for name, values in study.vary.items() for value in values[1:]]
     changes += [{name: end} for name, law in study.draw.items() for end in law.extremes()]
@@ -135,7 +152,10 @@ def _check(study: Study, source: Source) -> None:
         try:
             source.check(values, study.first_seed)
         except InputError as error:
-            raise relative(error, {**study.parameters, **values}, where) from None
+            ours = relative(error, {**study.parameters, **values}, where)
+            if ours is error and isinstance(source, ScenarioSource) and source.file:
+                raise error.located(source.file) from None
+            raise ours from None
     _check_columns(study, source, first)
 
 

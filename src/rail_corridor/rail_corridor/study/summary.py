@@ -20,6 +20,8 @@ from .model import Study
 
 #: An interval is even when its middle is off the value by no more than this part of it.
 _EVEN: Final = 0.05
+#: All runs gave the same, but for rounding.
+_NOTHING: Final = 1e-12
 _UNLIMITED: Final = 100_000
 
 
@@ -119,25 +121,18 @@ def total_of(groups: Sequence[Group], entries: Iterable[Entry], study: Study) ->
 
 
 def print_summary(
-    title: str,
-    groups: Sequence[Group],
-    by: Sequence[str],
-    names: Sequence[str],
-    console: Console,
-    total: Group | None = None,
+    study: Study, groups: Sequence[Group], console: Console, total: Group | None = None
 ) -> None:
     """Show figures of groups as tables as wide as the console, with their 95 % intervals."""
-    names = list(names)
-    while True:
+    names, title = list(study.figures), study.name
+    while names:
         shown = len(names)
         while shown > 1 and (
-            _width(_table(title, groups, by, names[:shown], total), console) > console.width
+            _width(_table(title, study, groups, names[:shown], total), console) > console.width
         ):
             shown -= 1
-        console.print(_table(title, groups, by, names[:shown], total))
-        names = names[shown:]
-        if not names:
-            return
+        console.print(_table(title, study, groups, names[:shown], total))
+        names, title = names[shown:], f"{study.name}, continued"
 
 
 def _width(table: Table, console: Console) -> int:
@@ -147,22 +142,20 @@ def _width(table: Table, console: Console) -> int:
 
 
 def _table(
-    title: str,
-    groups: Sequence[Group],
-    by: Sequence[str],
-    names: Sequence[str],
-    total: Group | None,
+    title: str, study: Study, groups: Sequence[Group], names: Sequence[str], total: Group | None
 ) -> Table:
+    by = study.columns
     table = Table(title=title, title_justify="left", title_style="bold")
     for name in by:
         table.add_column(name.rpartition(".")[2].replace("_", "\n"), no_wrap=True)
     table.add_column("runs", justify="right", no_wrap=True)
     for name in names:
-        table.add_column(name.replace("_", "\n"), justify="right", no_wrap=True)
+        heading = f"{name.replace('_', chr(10))}\n[dim]{study.figures[name].over_runs}[/dim]"
+        table.add_column(heading, justify="right", no_wrap=True)
     for group in groups:
         table.add_row(*_cells(group, names), end_section=group is groups[-1])
     if total is not None:
-        table.add_row("all", *[""] * (len(by) - 1), *_cells(total, names))
+        table.add_row("[bold]together[/bold]", *[""] * (len(by) - 1), *_cells(total, names))
     return table
 
 
@@ -171,8 +164,14 @@ def _cells(group: Group, names: Sequence[str]) -> list[str]:
     return [
         *(f"{v:g}" if isinstance(v, float) else escape(str(v)) for v in group.key),
         f"{group.runs}{failed}",
-        *(escape(text_of(group.estimates[n])) if n in group.estimates else "" for n in names),
+        *(_text(group.estimates[n], group.runs) if n in group.estimates else "" for n in names),
     ]
+
+
+def _text(estimate: Estimate, runs: int) -> str:
+    """An estimate, and of how many runs it is where it is not known in all."""
+    few = f" [dim]({estimate.runs} of {runs})[/dim]" if 0 < estimate.runs < runs else ""
+    return escape(text_of(estimate)) + few
 
 
 def text_of(estimate: Estimate) -> str:
@@ -186,7 +185,7 @@ def text_of(estimate: Estimate) -> str:
     value, low, high = estimate.value, estimate.low, estimate.high
     if math.isnan(value):
         return "-"
-    if math.isnan(estimate.half_width):
+    if math.isnan(estimate.half_width) or estimate.half_width <= _NOTHING * abs(value):
         return f"{value:.6g}"
     if abs(high + low - 2.0 * value) <= _EVEN * (high - low):
         return f"{value:.4g} ± {estimate.half_width:.2g}"

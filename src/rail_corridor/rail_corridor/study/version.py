@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import subprocess
 from functools import cache
 from importlib.metadata import version
@@ -12,10 +13,19 @@ from pathlib import Path
 def code_version() -> str:
     """Version of the corridor, with the commit where it runs from a checkout."""
     here = Path(__file__).resolve().parent
-    command = ["git", "-C", str(here), "describe", "--always", "--dirty"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=5.0)
-        commit = done.stdout.strip() if done.returncode == 0 else ""
-    except (OSError, subprocess.TimeoutExpired):
-        commit = ""
+    commit = _git(here, "describe", "--always", "--dirty").decode().strip()
+    if commit.endswith("-dirty"):
+        # Which changes these are: other ones may give other rows.
+        commit += f".{hashlib.sha256(_git(here, 'diff', 'HEAD')).hexdigest()[:8]}"
     return f"{version('rail-corridor')}{'+' if commit else ''}{commit}"
+
+
+def _git(folder: Path, *arguments: str) -> bytes:
+    """What git says of a checkout; nothing where there is none."""
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(folder), *arguments], capture_output=True, check=False, timeout=10.0
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return b""
+    return done.stdout if done.returncode == 0 else b""

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure as Canvas
 from rail_corridor.plotting import COLOURS, STYLE
 
 from .figures import Figure
+from .intervals import Estimate
 from .model import Study
 from .summary import Group
 
@@ -56,25 +57,27 @@ def _draw(
         lines.setdefault(group.key[1:], []).append(group)
     names = list(dict.fromkeys(str(group.key[0]) for group in groups)) if by else [""]
     numeric = bool(by) and all(_is_number(group.key[0]) for group in groups)
-    values: list[float] = []
+    low = _least(name, groups, figures[name])
+    beside = [other for other, figure in figures.items() if figure.beside == name]
     for number, (rest, line) in enumerate(lines.items()):
         x = [
             group.key[0] if numeric else names.index(str(group.key[0])) if by else 0
             for group in line
         ]
-        label = ", ".join(f"{_short(k)} {v}" for k, v in zip(by[1:], rest, strict=True))
+        label = ", ".join(f"{_short(k)} {v}" for k, v in zip(by[1:], rest, strict=True)) or name
         colour = COLOURS[number % len(COLOURS)]
-        values += _points(axes, x, line, name, "o-" if numeric else "o", colour, label)
-        for other, figure in figures.items():
-            if figure.beside == name:
-                y = [group.estimates[other].value for group in line]
-                axes.plot(x, y, "--", color=colour, linewidth=1.0)
-                note = f"dashed: {other.replace('_', ' ')}"
-                axes.annotate(note, (0.02, 0.97), xycoords="axes fraction", va="top", fontsize=8)
-    positive = [value for value in values if value > 0.0]
-    is_rate = figures[name].over_runs in ("proportion", "rate")
-    if is_rate and positive and max(positive) > _DECADES * min(positive):
+        style = {"color": colour, "label": label, "fmt": "o-" if numeric else "o"}
+        _points(axes, x, [group.estimates[name] for group in line], low, style)
+        for other in beside:
+            y = [group.estimates[other].value for group in line]
+            axes.plot(x, y, "--", color=colour, linewidth=1.0)
+    for place, other in enumerate(beside):
+        note = f"dashed: {other.replace('_', ' ')}"
+        where = (0.98, 0.97 - 0.07 * place)
+        axes.annotate(note, where, xycoords="axes fraction", ha="right", va="top", fontsize=8)
+    if low is not None:
         axes.set_yscale("log")
+        axes.set_ylim(bottom=low)
     if by and not numeric:
         axes.set_xticks(range(len(names)), names, rotation=30, ha="right")
     how = figures[name].over_runs
@@ -82,26 +85,37 @@ def _draw(
     axes.set_xlabel(_short(by[0]).replace("_", " ") if by else "")
 
 
+def _least(name: str, groups: Sequence[Group], figure: Figure) -> float | None:
+    """Lower end of a logarithmic axis; None where rates do not differ by so much."""
+    estimates = [group.estimates[name] for group in groups]
+    positive = [e.value for e in estimates if e.value > 0.0]
+    if figure.over_runs not in ("proportion", "rate") or not positive:
+        return None
+    if max(positive) <= _DECADES * min(positive):
+        return None
+    lows = [e.low for e in estimates if e.low > 0.0]
+    return 0.5 * min([*positive, *lows, *(e.high for e in estimates if e.high > 0.0)])
+
+
 def _points(
     axes: Any,
     x: Sequence[Any],
-    line: Sequence[Group],
-    name: str,
-    style: str,
-    colour: str,
-    label: str,
-) -> list[float]:
-    """Draw values and intervals; returns the values."""
-    estimates = [group.estimates[name] for group in line]
+    estimates: Sequence[Estimate],
+    low: float | None,
+    style: Mapping[str, Any],
+) -> None:
+    """Draw values and intervals; on a logarithmic axis of zero the upper end alone."""
+    shown = [(at, e) for at, e in zip(x, estimates, strict=True) if low is None or e.value > 0.0]
     reach = [
-        [0.0 if math.isnan(e.half_width) else max(0.0, e.value - e.low) for e in estimates],
-        [0.0 if math.isnan(e.half_width) else max(0.0, e.high - e.value) for e in estimates],
+        [0.0 if math.isnan(e.half_width) else max(0.0, e.value - e.low) for _, e in shown],
+        [0.0 if math.isnan(e.half_width) else max(0.0, e.high - e.value) for _, e in shown],
     ]
-    values = [e.value for e in estimates]
-    axes.errorbar(
-        x, values, yerr=reach, fmt=style, ms=3.5, capsize=2, color=colour, label=label or name
-    )
-    return values
+    places, values = [at for at, _ in shown], [e.value for _, e in shown]
+    axes.errorbar(places, values, yerr=reach, ms=3.5, capsize=2, **style)
+    if low is not None:
+        none = [(at, e.high) for at, e in zip(x, estimates, strict=True) if e.value == 0.0]
+        places, ends = [at for at, _ in none], [end for _, end in none]
+        axes.plot(places, ends, "v", ms=4.5, color=style["color"], fillstyle="none")
 
 
 def _differs(name: str, groups: Sequence[Group]) -> bool:

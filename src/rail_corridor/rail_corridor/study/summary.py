@@ -22,6 +22,8 @@ from .model import Study
 _EVEN: Final = 0.05
 #: All runs gave the same, but for rounding.
 _NOTHING: Final = 1e-12
+#: Intervals below are told with powers of ten.
+_SMALL: Final = 1e-3
 _UNLIMITED: Final = 100_000
 
 
@@ -177,8 +179,10 @@ def _text(estimate: Estimate, runs: int) -> str:
 def text_of(estimate: Estimate) -> str:
     """An estimate in a cell: with ± if its interval is even on both sides, else with its ends.
 
-    >>> text_of(Estimate(0.12345, 0.12, 0.1269, 10)), text_of(Estimate(0.0, 0.0, 0.0037, 1000))
-    ('0.1235 ± 0.0034', '0 [0, 0.0037]')
+    >>> text_of(Estimate(0.12345, 0.12, 0.1269, 10)), text_of(Estimate(0.9967, 0.9931, 0.9987, 9))
+    ('0.1235 ± 0.0034', '0.9967 [0.9931, 0.9987]')
+    >>> text_of(Estimate(0.0, 0.0, 7.5, 9)), text_of(Estimate(3.4e-07, 8.6e-09, 1.9e-06, 9))
+    ('0.0 [0.0, 7.5]', '3.4e-07 [8.6e-09, 1.9e-06]')
     >>> text_of(Estimate(3.0, math.nan, math.nan, 1)), text_of(Estimate(math.nan, 0.0, 0.0, 0))
     ('3', '-')
     """
@@ -189,4 +193,7 @@ def text_of(estimate: Estimate) -> str:
         return f"{value:.6g}"
     if abs(high + low - 2.0 * value) <= _EVEN * (high - low):
         return f"{value:.4g} ± {estimate.half_width:.2g}"
-    return f"{value:.3g} [{low:.2g}, {high:.2g}]"
+    if high < _SMALL:
+        return f"{value:.3g} [{low:.2g}, {high:.2g}]"
+    digits = max(0, 1 - math.floor(math.log10(high - low)))  # what the interval is worth
+    return f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"

@@ -11,6 +11,7 @@ from rail_corridor.cli.completion import (
     complete_file,
     complete_recording,
     complete_scenario,
+    complete_study,
     complete_topic,
     complete_trace,
 )
@@ -28,6 +29,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_scenarios_are_the_built_in_ones_and_files() -> None:
     assert complete_scenario("de") == ["dead_station", "demo", "demo.yaml"]
     assert complete_scenario("nothing_of_this") == []
+    assert complete_study("ki") == ["kills"]
 
 
 def test_files_are_of_the_kind_that_is_wanted() -> None:

@@ -1,4 +1,4 @@
-"""Completion in the shell: scenarios, topics of a running corridor, files; silent on failure."""
+"""Completion in the shell: scenarios, studies, topics of a running corridor, files; silent."""
 
 from __future__ import annotations
 
@@ -13,10 +13,18 @@ TOPICS_S: Final = 1.5
 
 def complete_scenario(incomplete: str) -> list[str]:
     """Built-in scenarios, and files of scenarios."""
-    folder = resources.files("rail_corridor.loading") / "builtin"
+    return [*_built_in("loading", incomplete), *_files(incomplete, (".yaml", ".yml"))]
+
+
+def complete_study(incomplete: str) -> list[str]:
+    """Studies that come along, and files of studies."""
+    return [*_built_in("studies", incomplete), *_files(incomplete, (".yaml", ".yml"))]
+
+
+def _built_in(package: str, incomplete: str) -> list[str]:
+    folder = resources.files(f"rail_corridor.{package}") / "builtin"
     names = [entry.name.removesuffix(".yaml") for entry in folder.iterdir()]
-    built_in = sorted(name for name in names if name.startswith(incomplete))
-    return [*built_in, *_files(incomplete, (".yaml", ".yml"))]
+    return sorted(name for name in names if name.startswith(incomplete))
 
 
 def complete_recording(incomplete: str) -> list[str]:

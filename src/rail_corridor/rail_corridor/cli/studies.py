@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_study
 from .usage import (
     ScenarioArgument,
     TrackOption,
@@ -42,6 +43,7 @@ def study(
         typer.Argument(
             help="A study file, or one that comes along; without it these are listed.",
             metavar="[STUDY]",
+            autocompletion=complete_study,
         ),
     ] = None,
     out: Annotated[

@@ -23,6 +23,7 @@ from rail_corridor.study.figures import Figure
 from rail_corridor.study.journal import Entries, Entry
 from rail_corridor.study.model import Study
 from rail_corridor.study.run_study import Where, run_study
+from rail_corridor.study.single_run import show_run
 from rail_corridor.study.sources import CalculationSource
 from rail_corridor.study.version import code_version
 
@@ -160,6 +161,29 @@ def test_what_fails_dies_or_hangs_is_made_once_more(client: Client, tmp_path: Pa
     assert [seed for seed, entry in found.items() if entry.failure] == [3]
     assert found[3].failure == "RuntimeError: no luck"
     assert all(found[seed].figures == {"square": seed} for seed in (1, 2, 4, 5, 6))
+
+
+def test_what_must_hold_is_told_with_the_command_that_repeats_it(
+    tmp_path: Path, here: Where
+) -> None:
+    figures = {"square": Figure(at_most=30), "odd": Figure(over_runs="proportion")}
+    asked = study(figures=figures, vary={"scale": (1.0,)})
+    source = CalculationSource(Parameters, square)
+    console = Console(width=100, record=True, file=io.StringIO())
+    assert run_study(asked, source, tmp_path / "a", console, "rail study s.yaml", where=here) == 1
+    assert "square is 36: rail study s.yaml --only 0:5" in console.export_text()
+    codes = {place: show_run(asked, source, place, console) for place in ("0:4", "0:5")}
+    assert codes == {"0:4": 0, "0:5": 1}
+    said = console.export_text().splitlines()
+    assert said == ["seed: 5", *said[1:4], "seed: 6", *said[5:]] and "square: 36.0" in said
+    with pytest.raises(InputError, match="--only: '1:0': must be CELL:RUN, a cell from 0 to 0"):
+        show_run(asked, source, "1:0", console)
+
+
+def test_a_study_that_is_over_is_shown_without_a_worker(tmp_path: Path, here: Where) -> None:
+    run(tmp_path / "a", here)
+    nowhere = Where(scheduler="tcp://127.0.0.1:9")
+    assert len(run(tmp_path / "a", nowhere, resume=True)) == 12
 
 
 def test_a_worker_of_another_version_is_refused(client: Client) -> None:

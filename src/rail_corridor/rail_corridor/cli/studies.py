@@ -116,6 +116,7 @@ def study(
         raise UsageError(f"--out: {folder}: is not a directory")
     check_writable("--out", (folder if folder.is_dir() else folder.parent) / "any")
     signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a shell has it ignored
     if workers is not None and scheduler is not None:
         raise UsageError("--workers: are those of the scheduler, where one is named")
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import islice
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -54,34 +53,48 @@ def conclude(
         list(study.figures),
     )
     groups = groups_of(entries, study.columns, study.figures)
-    failures = [entry for entry in entries if entry.failure is not None]
-    violations = violations_of(entries, study.figures)
     if not groups:
         console.print("no run has ended")
         return StudyOutcome(study, entries, groups, 0, 0)
     write_csv(out / "rows.csv", rows, entries)
     if has_parquet():
         write_parquet(out / "rows.parquet", out / "rows.csv", rows, entries)
+    print_summary(study, groups, console, total_of(groups, entries, study))
     names = [name for name, figure in study.figures.items() if figure.beside is None]
-    total = total_of(groups, entries, study)
-    print_summary(study, groups, console, total)
     draw_study(out / "summary.png", study, groups, names)
-    told = list(islice(violations, _MOST_TOLD))
-    for violation in told:
-        said = f"[red]{violation.figure} is {violation.value}[/red]"
-        console.print(f"{said}: {_again(command, violation.entry)}", soft_wrap=True)
-    for entry in failures[:_MOST_TOLD]:
-        said = f"[red]failed:[/red] {escape(str(entry.failure))}"
-        console.print(f"{said}: {_again(command, entry)}", soft_wrap=True)
-    violated = len(told) + sum(1 for _ in violations)
-    for count, what in (
-        (violated, "figures that are not as they must be"),
-        (len(failures), "failed runs"),
-    ):
-        if count > _MOST_TOLD:
-            console.print(f"[red]{count} {what} in all[/red]")
+    violated = _tell_violations(study, entries, console, command)
+    failed = _tell_failures(entries, console, command)
     console.print(f"{len(entries)} rows in {out / 'rows.csv'}", soft_wrap=True)
-    return StudyOutcome(study, entries, groups, violated, len(failures))
+    return StudyOutcome(study, entries, groups, violated, failed)
+
+
+def _tell_violations(study: Study, entries: Entries, console: Console, command: str) -> int:
+    """Show the first figures that are not as they must be; how many there are."""
+    count = 0
+    for violation in violations_of(entries, study.figures):
+        count += 1
+        if count <= _MOST_TOLD:
+            value = "not known" if violation.value is None else f"{violation.value:g}"
+            said = f"[red]{violation.figure} is {value}[/red]"
+            console.print(f"{said}: {_again(command, violation.entry)}", soft_wrap=True)
+    if count > _MOST_TOLD:
+        console.print(f"[red]{count} figures in all are not as they must be[/red]")
+    return count
+
+
+def _tell_failures(entries: Entries, console: Console, command: str) -> int:
+    """Show the first runs that have failed; how many there are."""
+    count = 0
+    for entry in entries:
+        if entry.failure is None:
+            continue
+        count += 1
+        if count <= _MOST_TOLD:
+            said = f"[red]failed:[/red] {escape(entry.failure)}"
+            console.print(f"{said}: {_again(command, entry)}", soft_wrap=True)
+    if count > _MOST_TOLD:
+        console.print(f"[red]{count} runs in all have failed[/red]")
+    return count
 
 
 def _again(command: str, entry: Entry) -> str:

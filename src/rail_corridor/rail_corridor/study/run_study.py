@@ -146,8 +146,7 @@ def run_study(
     """
     before = None if compare is None else entries_of(compare, study.name)
     with _alone_in(out):
-        moved = _run(study, source, out, console, command, where or Where(), resume, before)
-    return moved
+        return _run(study, source, out, console, command, where or Where(), resume, before)
 
 
 def _run(
@@ -166,24 +165,37 @@ def _run(
     for entry in Entries(journal.path):
         cells.take_earlier(entry)
     try:
-        with progress(console, study.name) as show, client_of(*where) as client:
-            engine = Engine(client, source, study.figures, study.timeout_s, code)
-            first = cells.more(1)
-            if first:
-                engine.try_out(first[0])
-            failed = 0
-            for entry in engine.results(first, cells.more):
-                journal.add(entry)
-                cells.take(entry)
-                failed += entry.failure is not None
-                show(cells.made, failed, engine.running, cells.wanted)
+        if not cells.over:
+            _make(study, source, console, where, code, cells, journal)
     finally:
         journal.close()
         if journal.path.exists():
             counting = Entries(journal.path, cells.ended)
             outcome = conclude(study, counting, out, code, console, command)
-        if not cells.over:
-            said = f"not over: {cells.made} of {cells.wanted} runs at most; go on with --resume"
-            console.print(f"[yellow]{said}[/yellow]", soft_wrap=True)
+            if not cells.over:
+                said = f"not over: {cells.made} of {cells.wanted} runs at most; go on with --resume"
+                console.print(f"[yellow]{said}[/yellow]", soft_wrap=True)
     moved = before is not None and print_moves(before, outcome, console)
     return 1 if outcome.violations or outcome.failed or moved else 0
+
+
+def _make(
+    study: Study,
+    source: Source,
+    console: Console,
+    where: Where,
+    code: str,
+    cells: _Cells,
+    journal: Journal,
+) -> None:
+    """Make the runs that are lacking."""
+    with progress(console, study.name) as show, client_of(*where) as client:
+        engine = Engine(client, source, study.figures, study.timeout_s, code)
+        first = cells.more(1)
+        engine.try_out(first[0])
+        failed = 0
+        for entry in engine.results(first, cells.more):
+            journal.add(entry)
+            cells.take(entry)
+            failed += entry.failure is not None
+            show(cells.made, failed, engine.running, cells.wanted)

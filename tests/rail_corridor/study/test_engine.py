@@ -18,6 +18,8 @@ from rich.console import Console
 
 from rail_corridor.errors import InputError
 from rail_corridor.study.cells import case_of, cells_of
+from rail_corridor.study.cluster import client_of
+from rail_corridor.study.corridor_run import SCRATCH
 from rail_corridor.study.engine import Engine, LostClusterError
 from rail_corridor.study.figures import Figure
 from rail_corridor.study.journal import Entries, Entry
@@ -184,6 +186,21 @@ def test_a_study_that_is_over_is_shown_without_a_worker(tmp_path: Path, here: Wh
     run(tmp_path / "a", here)
     nowhere = Where(scheduler="tcp://127.0.0.1:9")
     assert len(run(tmp_path / "a", nowhere, resume=True)) == 12
+
+
+def scratch() -> tuple[str, bool]:
+    """Return the folder for what a worker leaves behind, and whether it is there."""
+    return os.environ[SCRATCH], Path(os.environ[SCRATCH]).is_dir()
+
+
+def test_each_study_of_a_process_has_a_folder_that_goes_with_it() -> None:
+    folders = []
+    for _ in range(2):
+        with client_of(None, 1) as client:
+            folder, is_there = client.submit(scratch).result()
+        folders.append(folder)
+        assert is_there and not Path(folder).exists()
+    assert len({*folders}) == 2
 
 
 def test_a_worker_of_another_version_is_refused(client: Client) -> None:

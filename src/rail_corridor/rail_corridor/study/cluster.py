@@ -56,7 +56,7 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         settings = {
             # Runs compute on one core each; numbers of threads are for who calls libraries at
             # will. What workers leave behind that are killed goes with the folder.
-            "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ALONE, "1") | {SCRATCH: scratch},
+            "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ALONE, "1"),
             "temporary-directory": scratch,
             # Ctrl-C is said to the whole group: workers are ended by who has started them.
             "distributed.worker.preload": [_HEEDLESS],
@@ -78,6 +78,7 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
                     dashboard_address=":0",
                     silence_logs=logging.CRITICAL,
                     host="127.0.0.1",
+                    env={SCRATCH: scratch},
                 )
             with cluster, untyped.Client(cluster) as client:
                 yield client

@@ -53,7 +53,7 @@ def test_a_lossy_network_between_two_hosts_changes_nothing(
     try:
         row = two_hosts.run_two_hosts(
             # Paced, so that losses of discovery are repaired before the trains' half ends.
-            [*SCENARIO, "--rate", "0.4", "--processes", "one"],
+            [*SCENARIO, "--rate", "0.2", "--processes", "one"],
             LOSS,
             patience_s=60.0,
             environment=rail.environment,

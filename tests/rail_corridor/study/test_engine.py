@@ -6,6 +6,8 @@ import fcntl
 import io
 import os
 import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -18,13 +20,11 @@ from rich.console import Console
 
 from rail_corridor.errors import InputError
 from rail_corridor.study.cells import case_of, cells_of
-from rail_corridor.study.cluster import client_of
-from rail_corridor.study.corridor_run import SCRATCH
 from rail_corridor.study.engine import Engine, LostClusterError
 from rail_corridor.study.figures import Figure
 from rail_corridor.study.journal import Entries, Entry
 from rail_corridor.study.model import Study
-from rail_corridor.study.run_study import Where, run_study
+from rail_corridor.study.run_study import Where, alone_in, run_study
 from rail_corridor.study.single_run import show_run
 from rail_corridor.study.sources import CalculationSource
 from rail_corridor.study.version import code_version
@@ -188,19 +188,27 @@ def test_a_study_that_is_over_is_shown_without_a_worker(tmp_path: Path, here: Wh
     assert len(run(tmp_path / "a", nowhere, resume=True)) == 12
 
 
-def scratch() -> tuple[str, bool]:
-    """Return the folder for what a worker leaves behind, and whether it is there."""
-    return os.environ[SCRATCH], Path(os.environ[SCRATCH]).is_dir()
-
-
-def test_each_study_of_a_process_has_a_folder_that_goes_with_it() -> None:
-    folders = []
+TWO_STUDIES = """
+import os
+from pathlib import Path
+from rail_corridor.study.cluster import client_of
+from rail_corridor.study.corridor_run import SCRATCH
+if __name__ == "__main__":
     for _ in range(2):
         with client_of(None, 1) as client:
-            folder, is_there = client.submit(scratch).result()
-        folders.append(folder)
-        assert is_there and not Path(folder).exists()
-    assert len({*folders}) == 2
+            folder = client.submit(os.getenv, SCRATCH).result()
+            print(folder, Path(folder).is_dir())
+"""
+
+
+def test_each_study_of_a_process_has_a_folder_that_goes_with_it(tmp_path: Path) -> None:
+    script = tmp_path / "two.py"
+    script.write_text(TWO_STUDIES)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (one, first), (two, second) = (line.split() for line in done.stdout.splitlines())
+    assert first == second == "True" and one != two
+    assert not Path(one).exists() and not Path(two).exists()
 
 
 def test_a_worker_of_another_version_is_refused(client: Client) -> None:
@@ -227,7 +235,9 @@ def test_a_folder_in_which_a_study_writes_is_not_taken(tmp_path: Path, here: Whe
     with pytest.raises(InputError, match=r"--out: .*another study is writing there"):
         run(out, here)
     os.close(held)
-    assert len(run(out, here)) == 12
+    with alone_in(out):
+        assert out.is_dir()
+    assert not out.exists()  # nothing was written
 
 
 def test_a_scheduler_that_goes_is_told(tmp_path: Path) -> None:

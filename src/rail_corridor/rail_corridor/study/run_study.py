@@ -34,7 +34,7 @@ class Where(NamedTuple):
 
 
 @contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
+def alone_in(folder: Path) -> Iterator[None]:
     """Hold a folder, which is made, against other studies; one that stays empty goes again."""
     folder.mkdir(exist_ok=True)
     held = os.open(folder, os.O_RDONLY)
@@ -145,7 +145,7 @@ def run_study(
         If the scheduler has gone.
     """
     before = None if compare is None else entries_of(compare, study.name)
-    with _alone_in(out):
+    with alone_in(out):
         return _run(study, source, out, console, command, where or Where(), resume, before)
 
 

@@ -83,7 +83,7 @@ def engine_s() -> float:
         engine = Engine(client, source(), STUDY.figures, STUDY.timeout_s, code_version())
         engine.try_out(waiting[0])
         begun_s = time.perf_counter()
-        made = list(engine.results((), more))
+        made = list(engine.results(more))
         wall_s = time.perf_counter() - begun_s
     if any(entry.failure for entry in made):
         raise RuntimeError("a run has failed")

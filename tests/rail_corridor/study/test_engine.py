@@ -158,7 +158,7 @@ def test_what_fails_dies_or_hangs_is_made_once_more(client: Client, tmp_path: Pa
     def more(count: int) -> list[Any]:
         return [cases.pop(0) for _ in range(min(count, len(cases)))]
 
-    found: dict[int, Entry] = {entry.seed: entry for entry in engine.results((), more)}
+    found: dict[int, Entry] = {entry.seed: entry for entry in engine.results(more)}
     assert sorted(found) == [1, 2, 3, 4, 5, 6]
     assert [seed for seed, entry in found.items() if entry.failure] == [3]
     assert found[3].failure == "RuntimeError: no luck"
@@ -215,9 +215,9 @@ def test_a_worker_of_another_version_is_refused(client: Client) -> None:
     asked = study(vary={})
     source = CalculationSource(Parameters, square)
     engine = Engine(client, source, asked.figures, 2.0, "9.9.9")
-    case = case_of(asked, cells_of(asked), 0, 0)
+    cases = [case_of(asked, cells_of(asked), 0, 0)]
     with pytest.raises(InputError, match=r"another version of the corridor than 9\.9\.9"):
-        list(engine.results([case], lambda _: []))
+        list(engine.results(lambda _: [cases.pop()] if cases else []))
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path) -> None:
@@ -247,11 +247,14 @@ def test_a_scheduler_that_goes_is_told(tmp_path: Path) -> None:
         client = Client(cluster)
         engine = Engine(client, source, asked.figures, 2.0, code_version())
 
-        def more(count: int) -> list[Any]:
-            cluster.close()
-            return [case_of(asked, cells_of(asked), 0, 1)]
+        runs = iter(range(9))
 
-        case = case_of(asked, cells_of(asked), 0, 0)
+        def more(count: int) -> list[Any]:
+            run = next(runs)
+            if run:
+                cluster.close()
+            return [case_of(asked, cells_of(asked), 0, run)]
+
         with pytest.raises(LostClusterError, match="go on with --resume"):
-            list(engine.results([case], more))
+            list(engine.results(more))
         client.close()

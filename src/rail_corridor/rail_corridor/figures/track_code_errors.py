@@ -12,17 +12,17 @@ from numpy.random import Generator
 
 from rail_corridor.plotting import COLOURS
 from rail_signals.arrays import FloatArray
-from rail_signals.track_code.bound import best_threshold, on_off_error_probability, tone_sigma_bound
-from rail_signals.track_code.ml import MaximumLikelihoodTones
+from rail_signals.track_code.bound import on_off_error_probability, tone_sigma_bound
 from rail_signals.track_code.profile import SLOT_RATE_HZ, TrackCodeProfile, load_profile
 from rail_signals.track_code.receiver import TrackCodeReceiver
 from rail_signals.track_code.signal import FmTransmitter
+from rail_signals.track_code.study.baseband import RATE_HZ as BASEBAND_RATE_HZ
+from rail_signals.track_code.study.baseband import slot_samples, snr_of
+from rail_signals.track_code.study.fit_errors import count_near
 from rail_signals.track_code.word import encode
 
 CARRIER_HZ: Final = 1700.0
 RATE_HZ: Final = 16_000.0
-#: Baseband in which the fit works.
-BASEBAND_HZ: Final = 640.0
 _WORDS: Final = 250
 _SECONDS: Final = 170.0
 _SETTLED_S: Final = 10.0
@@ -35,47 +35,11 @@ def bound(profile: TrackCodeProfile, densities_db_hz: Sequence[float]) -> FloatA
     As `rail_signals.track_code.bound.message_error_bound`, but the covariance, which takes time
     and only scales with the noise, is computed once.
     """
-    sigma = tone_sigma_bound(profile.tones_hz, 1.0, _slot_samples(profile), BASEBAND_HZ)
+    sigma = tone_sigma_bound(profile.tones_hz, 1.0, slot_samples(profile), BASEBAND_RATE_HZ)
     ratio = np.array(profile.deviations_hz) / sigma
-    snr = 10 ** (np.asarray(densities_db_hz) / 10) / BASEBAND_HZ
+    snr = np.array([snr_of(density) for density in densities_db_hz])
     wrong = on_off_error_probability(np.sqrt(snr)[:, None] * ratio)
     return np.asarray(-np.expm1(np.log1p(-wrong).sum(axis=1)))
-
-
-def fit_errors(
-    profile: TrackCodeProfile, densities_db_hz: Sequence[float], words: int, rng: Generator
-) -> list[float]:
-    """Shares of slots that the fit, started at the truth, reads wrong."""
-    fit = MaximumLikelihoodTones(
-        profile.tones_hz,
-        _slot_samples(profile),
-        BASEBAND_HZ,
-        deviations_hz=profile.deviations_hz,
-    )
-    return [_fit_errors(fit, profile, level, words, rng) for level in densities_db_hz]
-
-
-def _fit_errors(
-    fit: MaximumLikelihoodTones,
-    profile: TrackCodeProfile,
-    density_db_hz: float,
-    words: int,
-    rng: Generator,
-) -> float:
-    tones, deviations = np.array(profile.tones_hz), np.array(profile.deviations_hz)
-    samples = _slot_samples(profile)
-    snr = 10 ** (density_db_hz / 10) / BASEBAND_HZ
-    sent = rng.integers(0, 2, (words, tones.size)).astype(bool)
-    turn = rng.uniform(0, 2 * math.pi, sent.shape)
-    waves = (sent * deviations * np.sin(turn), sent * deviations * np.cos(turn))
-    start = np.concatenate((np.zeros((words, 2)), *waves), axis=1)
-    start[:, 0] = rng.uniform(0, 2 * math.pi, words)
-    noise = rng.standard_normal((words, samples, 2)).view(np.complex128)[..., 0]
-    slots = np.exp(1j * start @ fit.basis) + noise * math.sqrt(0.5 / snr)
-    sigma = tone_sigma_bound(tones, snr, samples, BASEBAND_HZ)
-    threshold = sigma * [best_threshold(ratio) for ratio in (deviations / sigma).tolist()]
-    decided = np.abs(fit.refine(slots, start).amplitudes_hz) > threshold
-    return float(np.mean((decided != sent).any(axis=1)))
 
 
 def chain_losses(
@@ -101,7 +65,7 @@ def draw(figure: Figure) -> None:
     fine_db = np.arange(19.0, 26.6, 0.5)
     axes.plot(fine_db, bound(profile, fine_db.tolist()), color="black", label="bound")
     levels_db = (19.5, 20.5, 21.5)
-    errors = fit_errors(profile, levels_db, _WORDS, rng)
+    errors = [count_near(profile, level, _WORDS, rng).errors / _WORDS for level in levels_db]
     seen = np.where(np.array(errors) > 0.0, errors, np.nan)
     axes.plot(levels_db, seen, "o", color=COLOURS[0], label="fit of the slot, started near")
     chain_db = (29.0, 30.5, 32.0)
@@ -121,7 +85,3 @@ def draw(figure: Figure) -> None:
         ylim=(1e-4, 1.5),
     )
     axes.legend(loc="lower right")
-
-
-def _slot_samples(profile: TrackCodeProfile) -> int:
-    return profile.slot_samples * round(BASEBAND_HZ / SLOT_RATE_HZ)

@@ -11,11 +11,12 @@ import math
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from rail_corridor.equipment.ranging.layout import Layout, Zone, layout_of
 from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.study.sources import Drawn
+from rail_corridor.study.strict import Strict
 
 Corridor = Literal["plain", "branching"]
 Manoeuvre = Literal["running", "standing", "reversing"]
@@ -39,10 +40,8 @@ _TURNS = 12
 _MANOEUVRES_S = 200.0
 
 
-class HandoverParameters(BaseModel):
+class HandoverParameters(Strict):
     """A situation, and how many trains are in it: manoeuvres have room for four."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     corridor: Corridor = "plain"
     manoeuvre: Manoeuvre = "running"

@@ -14,9 +14,9 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
-from rail_corridor.errors import did_you_mean
+from rail_corridor.study.strict import Strict, one_of
 from rail_signals.arrays import FloatArray
 from rail_signals.localizer.settings import LocalizerSettings, Sensor
 from rail_signals.localizer.study.campaign import stated_s, tally
@@ -34,10 +34,8 @@ FAULTS: Final[Mapping[str, tuple[Sensor, FaultKind] | None]] = MappingProxyType(
 )
 
 
-class IntegrityParameters(BaseModel):
+class IntegrityParameters(Strict):
     """Trains on a simulated line, each with one fault of one sensor."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     fault: str = Field(NO_FAULT, description="sensor and kind, as range bias, or none")
     world: str = Field(AS_BELIEVED, description="how the sensors err without a fault")
@@ -47,19 +45,12 @@ class IntegrityParameters(BaseModel):
     @field_validator("fault")
     @classmethod
     def _is_a_fault(cls, value: str) -> str:
-        return _one_of(FAULTS, value, "fault")
+        return one_of(FAULTS, value, "fault")
 
     @field_validator("world")
     @classmethod
     def _is_a_world(cls, value: str) -> str:
-        return _one_of(WORLDS, value, "world")
-
-
-def _one_of(known: Mapping[str, object], value: str, what: str) -> str:
-    if value not in known:
-        near = did_you_mean(value, known)
-        raise ValueError(f"there is no such {what}{near}; there are {', '.join(known)}")
-    return value
+        return one_of(WORLDS, value, "world")
 
 
 def count_integrity(parameters: IntegrityParameters, seed: int) -> Mapping[str, float | None]:

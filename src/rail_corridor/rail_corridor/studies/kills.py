@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from rail_corridor.equipment.ranging.layout import layout_of
 from rail_corridor.equipment.ranging.nodes import CONTROLLER, MEDIUM
@@ -22,6 +22,7 @@ from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.run.kills import Kill
 from rail_corridor.scenario.model import Scenario
 from rail_corridor.study.sources import Drawn
+from rail_corridor.study.strict import Strict
 
 DURATION_S: Final = 70.0
 TICK_S: Final = 0.25
@@ -43,10 +44,8 @@ _CLEAR_M = 20.0
 _STREAM = 91
 
 
-class KillParameters(BaseModel):
+class KillParameters(Strict):
     """What the drawn scenarios have in common."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     duration_s: float = Field(DURATION_S, ge=LATEST_S + 5.0, le=3600.0)
 

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from rail_corridor.yaml_file import load_yaml
+from rail_corridor.study.study_file import descriptions
 
 from .registry import CALCULATIONS, FOLDER, GENERATORS
 
@@ -19,17 +19,13 @@ def tables() -> str:
         [
             "| Study | What it asks |",
             "|---|---|",
-            *(f"| `{path.stem}` | {load_yaml(path)['description']} |" for path in _studies()),
+            *(f"| `{name}` | {asked} |" for name, asked in descriptions(FOLDER).items()),
             "",
             *_sources("Generator", {name: (g, g.draw) for name, g in GENERATORS.items()}),
             "",
             *_sources("Calculation", {name: (c, c.calculate) for name, c in CALCULATIONS.items()}),
         ]
     )
-
-
-def _studies() -> list[Any]:
-    return sorted(FOLDER.glob("*.yaml"))
 
 
 def _sources(kind: str, sources: Mapping[str, Any]) -> Iterator[str]:

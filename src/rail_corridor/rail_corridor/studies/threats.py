@@ -16,8 +16,9 @@ from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple, Protocol
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from rail_corridor.study.strict import Strict
 from rail_msgs_py.stamps import NANOSECONDS, seconds_to_ns
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
 from rail_msgs_py.train_radio.safe_frame import FrameKind
@@ -136,10 +137,8 @@ class _Oracle:
         return None
 
 
-class ThreatParameters(BaseModel):
+class ThreatParameters(Strict):
     """Frames under a threat."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     threat: Literal["all"] | Threat = "all"
     frames: int = Field(10_000, ge=1, le=100_000_000)

@@ -9,8 +9,9 @@ from collections.abc import Mapping
 from typing import Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
+from rail_corridor.study.strict import Strict
 from rail_signals.track_code.profile import load_profile
 from rail_signals.track_code.study.baseband import with_deviations_scaled
 from rail_signals.track_code.study.chain_errors import count_noise_only
@@ -24,10 +25,8 @@ PROFILE: Final = "tones27"
 NOISE_ONLY: Final = "noise_only"
 
 
-class TrackCodeErrorParameters(BaseModel):
+class TrackCodeErrorParameters(Strict):
     """Random words in white noise, and who receives them."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     receiver: Receiver | Literal["noise_only"] = Field(
         "chain_bits", description="who receives; noise_only is chain_lost without a carrier"

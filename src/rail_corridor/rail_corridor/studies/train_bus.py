@@ -11,9 +11,9 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
-from rail_corridor.errors import did_you_mean
+from rail_corridor.study.strict import Strict, one_of
 from rail_signals.train_bus.faults import KINDS
 from rail_signals.train_bus.study.campaign import HEALTHY, draw_case, examine
 from rail_signals.train_bus.study.detection_limits import detectable_size, fault_of_size
@@ -33,10 +33,8 @@ SIZES: Final[Mapping[str, Literal["ohm", "%"]]] = MappingProxyType(
 )
 
 
-class TrainBusParameters(BaseModel):
+class TrainBusParameters(Strict):
     """Trains whose bus has one fault of a kind, or none."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     fault: str = Field(HEALTHY, description="kind of the fault, or healthy")
     snr_db: float = Field(60.0, ge=0.0, le=120.0, description="signal to noise of one trace")
@@ -45,16 +43,11 @@ class TrainBusParameters(BaseModel):
     @field_validator("fault")
     @classmethod
     def _is_one(cls, value: str) -> str:
-        if value not in CONDITIONS:
-            near = did_you_mean(value, CONDITIONS)
-            raise ValueError(f"there is no such fault{near}; there are {', '.join(CONDITIONS)}")
-        return value
+        return one_of(CONDITIONS, value, "fault")
 
 
-class TrainBusLimitParameters(BaseModel):
+class TrainBusLimitParameters(Strict):
     """A kind of fault whose size is looked for at which it has an even chance to be found."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: Literal["bad_splice", "loose_connector", "water_ingress", "wrong_cable"] = "bad_splice"
     snr_db: float = Field(60.0, ge=0.0, le=120.0, description="signal to noise of one trace")

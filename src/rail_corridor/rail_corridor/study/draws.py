@@ -6,13 +6,15 @@ import math
 from typing import Any, Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from .strict import Strict
 
 Pair = tuple[float, float]
 _FURTHEST: Final = 2**53
 
 
-class Draw(BaseModel):
+class Draw(Strict):
     """One law, by its name.
 
     >>> Draw(uniform=(1.0, 3.0)).value(np.random.default_rng(1))
@@ -20,8 +22,6 @@ class Draw(BaseModel):
     >>> Draw(choice=["siso", "mrc"]).value(np.random.default_rng(1))
     'siso'
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     uniform: Pair | None = Field(None, description="from, to")
     log_uniform: Pair | None = Field(None, description="from, to, both above zero")

@@ -142,13 +142,11 @@ class Engine:
             self._source.try_out, case.values, case.seed, self._figures, pure=False
         ).result()
 
-    def results(self, first: Sequence[Case], more: More) -> Iterator[Entry]:
+    def results(self, more: More) -> Iterator[Entry]:
         """Make cases until there are no more.
 
         Parameters
         ----------
-        first : sequence of Case
-            To begin with.
         more : callable
             At most so many further cases, in the order in which they are wanted; none when there
             are no more for now.
@@ -166,8 +164,6 @@ class Engine:
             If the scheduler has gone.
         """
         try:
-            if first:
-                self._send(first)
             while True:
                 self._fill(more)
                 if not self._under_way:

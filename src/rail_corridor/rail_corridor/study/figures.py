@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from rail_corridor.errors import InputError, did_you_mean
+
+from .strict import Strict
 
 Take = Literal["value", "sum", "min", "max", "mean", "count"]
 OverRuns = Literal["mean", "sum", "min", "max", "median", "p90", "p95", "proportion", "rate"]
@@ -16,10 +18,8 @@ OverRuns = Literal["mean", "sum", "min", "max", "median", "p90", "p95", "proport
 _MOST_NAMED: Final = 8
 
 
-class Figure(BaseModel):
+class Figure(Strict):
     """One figure of a run: a place in its report, and what must hold of it in every run."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     of: str | None = Field(
         None,

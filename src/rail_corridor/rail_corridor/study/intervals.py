@@ -33,6 +33,11 @@ class Estimate:
         return 0.5 * (self.high - self.low)
 
 
+def known_or_nan(value: float | None) -> float:
+    """A value, NaN where it is not known."""
+    return math.nan if value is None else value
+
+
 def estimate(
     values: Sequence[float], how: OverRuns, per: Sequence[float] | None = None
 ) -> Estimate:

@@ -5,52 +5,45 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from .draws import Draw
 from .figures import Figure
+from .strict import Strict
 
 _NAME = r"^[a-z][a-z0-9_]*$"
 #: Columns that every study has.
 RESERVED = ("study", "version", "cell", "run", "seed", "failure")
 
 
-class HalfWidth(BaseModel):
+class HalfWidth(Strict):
     """Enough runs: the 95 % interval of a figure is that narrow."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     figure: str
     below: float = Field(gt=0.0)
     least_runs: int = Field(10, ge=2)
 
 
-class Events(BaseModel):
+class Events(Strict):
     """Enough runs: the sum of a figure has reached a number."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     figure: str
     count: float = Field(gt=0.0)
 
 
-class Stop(BaseModel):
+class Stop(Strict):
     """When a cell has had enough runs; the first rule that is fulfilled ends it."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     half_width: HalfWidth | None = None
     events: Events | None = None
 
 
-class Study(BaseModel):
+class Study(Strict):
     """One study: what is run, what is varied, what is looked at.
 
     A *cell* is one of ``cells`` with one combination of the values in ``vary``; it is run with
     seeds of its own.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(pattern=_NAME)
     description: str = ""

@@ -6,12 +6,12 @@ import csv
 import importlib.util
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from .journal import Entry
+from .model import RESERVED
 
-_FIRST: Final = ("study", "version", "cell", "run", "seed")
-_LAST: Final = "failure"
+*_FIRST, _LAST = RESERVED
 
 
 class Rows:

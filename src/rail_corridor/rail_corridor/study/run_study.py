@@ -146,37 +146,25 @@ def run_study(
     """
     before = None if compare is None else entries_of(compare, study.name)
     with alone_in(out):
-        return _run(study, source, out, console, command, where or Where(), resume, before)
-
-
-def _run(
-    study: Study,
-    source: Source,
-    out: Path,
-    console: Console,
-    command: str,
-    where: Where,
-    resume: bool,
-    before: Entries | None,
-) -> int:
-    code = code_version()
-    journal = Journal(out / JOURNAL, Header.of(study, source, code), resume=resume)
-    cells = _Cells(study)
-    for entry in Entries(journal.path):
-        cells.take_earlier(entry)
-    try:
-        if not cells.over:
-            _make(study, source, console, where, code, cells, journal)
-    finally:
-        journal.close()
-        if journal.path.exists():
-            counting = Entries(journal.path, cells.ended)
-            outcome = conclude(study, counting, out, code, console, command)
+        code = code_version()
+        journal = Journal(out / JOURNAL, Header.of(study, source, code), resume=resume)
+        cells = _Cells(study)
+        for entry in Entries(journal.path):
+            cells.take_earlier(entry)
+        try:
             if not cells.over:
-                said = f"not over: {cells.made} of {cells.wanted} runs at most; go on with --resume"
-                console.print(f"[yellow]{said}[/yellow]", soft_wrap=True)
-    moved = before is not None and print_moves(before, outcome, console)
-    return 1 if outcome.violations or outcome.failed or moved else 0
+                _make(study, source, console, where or Where(), code, cells, journal)
+        finally:
+            journal.close()
+            if journal.path.exists():
+                counting = Entries(journal.path, cells.ended)
+                outcome = conclude(study, counting, out, code, console, command)
+                if not cells.over:
+                    made = f"{cells.made} of {cells.wanted} runs at most"
+                    said = f"[yellow]not over: {made}; go on with --resume[/yellow]"
+                    console.print(said, soft_wrap=True)
+        moved = before is not None and print_moves(before, outcome, console)
+        return 1 if outcome.violations or outcome.failed or moved else 0
 
 
 def _make(
@@ -191,10 +179,9 @@ def _make(
     """Make the runs that are lacking."""
     with progress(console, study.name) as show, client_of(*where) as client:
         engine = Engine(client, source, study.figures, study.timeout_s, code)
-        first = cells.more(1)
-        engine.try_out(first[0])
+        engine.try_out(case_of(study, cells_of(study), 0, 0))
         failed = 0
-        for entry in engine.results(first, cells.more):
+        for entry in engine.results(cells.more):
             journal.add(entry)
             cells.take(entry)
             failed += entry.failure is not None

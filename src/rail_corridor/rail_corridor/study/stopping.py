@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from .figures import Figure
-from .intervals import estimate
+from .intervals import estimate, known_or_nan
 from .model import Stop
 
 #: An interval is looked at again after one run in so many more.
@@ -57,11 +57,11 @@ class Stopping:
             return
         if self._rule.half_width is not None:
             name = self._rule.half_width.figure
-            self._values.append(_known(figures.get(name)))
+            self._values.append(known_or_nan(figures.get(name)))
             per = self._figures[name].per
-            self._per.append(1.0 if per is None else _known(figures.get(per)))
+            self._per.append(1.0 if per is None else known_or_nan(figures.get(per)))
         if self._rule.events is not None:
-            value = _known(figures.get(self._rule.events.figure))
+            value = known_or_nan(figures.get(self._rule.events.figure))
             self._sum += 0.0 if math.isnan(value) else value
 
     def _is_enough(self) -> bool:
@@ -77,7 +77,3 @@ class Stopping:
         how = "mean" if figure.over_runs in ("sum", "min", "max") else figure.over_runs
         found = estimate(self._values, how, None if figure.per is None else self._per)
         return found.half_width <= rule.half_width.below
-
-
-def _known(value: float | None) -> float:
-    return math.nan if value is None else value

@@ -78,19 +78,28 @@ def _changed(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str,
 def list_studies(folder: Path, console: Console) -> None:
     """Show what studies come with the corridor."""
     table = Table(box=None, show_header=False)
-    for path in sorted(folder.glob("*.yaml")):
-        table.add_row(path.stem, str(load_yaml(path).get("description", "")))
+    for name, description in descriptions(folder).items():
+        table.add_row(name, description)
     console.print(table)
 
 
+def descriptions(folder: Path) -> dict[str, str]:
+    """What the studies of a folder ask, by their names."""
+    return {name: str(load_yaml(path)["description"]) for name, path in _studies(folder).items()}
+
+
+def _studies(folder: Path) -> dict[str, Path]:
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
 def _find(name: str, folder: Path) -> Path:
-    known = {path.stem: path for path in folder.glob("*.yaml")}
+    known = _studies(folder)
     if name in known:
         return known[name]
     path = Path(name)
     if path.suffix in (".yaml", ".yml") or path.exists():
         return path
-    reason = f"no such study{did_you_mean(name, known)}; there are {', '.join(sorted(known))}"
+    reason = f"no such study{did_you_mean(name, known)}; there are {', '.join(known)}"
     raise InputError(reason, field="STUDY", value=name)
 
 

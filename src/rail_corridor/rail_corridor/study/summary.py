@@ -14,7 +14,7 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from .figures import Figure
-from .intervals import Estimate, estimate
+from .intervals import Estimate, estimate, known_or_nan
 from .journal import Entry
 from .model import Study
 
@@ -50,8 +50,7 @@ class _Members:
             return
         self.runs += 1
         for name, values in self.values.items():
-            value = entry.figures.get(name)
-            values.append(math.nan if value is None else value)
+            values.append(known_or_nan(entry.figures.get(name)))
 
     def group(self, key: tuple[Any, ...], figures: Mapping[str, Figure]) -> Group:
         estimates = {

@@ -16,11 +16,12 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from rail_corridor.equipment.train_radio.report import PASSED_AT
 from rail_corridor.loading.schema import parse_scenario
 from rail_corridor.study.sources import Drawn
+from rail_corridor.study.strict import Strict
 
 from .theory import LinkPrediction, predict
 
@@ -35,10 +36,8 @@ _SPACING_M = 600.0
 _COVERAGE_RANGE_M = 1.4 * _SPACING_M
 
 
-class LinkMarginParameters(BaseModel):
+class LinkMarginParameters(Strict):
     """A scheme, what the stretch costs its links, and the line."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     scheme: SchemeName = "siso"
     loss_db: float = Field(30.0, ge=0.0, le=100.0)

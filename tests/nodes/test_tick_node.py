@@ -236,13 +236,97 @@ def test_a_medium_without_its_part_of_the_world_says_so(graph: Any, world_file: 
     assert str(caught.value) == f"bus_echo: world_file: {world_file}: describes no train_bus"
 
 
-def test_a_node_that_cannot_be_switched_off_has_no_lifecycle(graph: Any, world_file: str) -> None:
+def test_a_medium_that_is_switched_off_is_dead_air(graph: Any, world_file: str) -> None:
     medium = EchoMedium(context=graph.context, parameters={"world_file": world_file})
-    graph.add(medium)
-    assert isinstance(medium, TickNode)
-    services = {name for name, _ in medium.get_service_names_and_types_by_node("echo", "/world")}
-    assert "/world/echo/get_parameters" in services
-    assert "/world/echo/change_state" not in services
+    legs = [
+        medium.leg(lambda stamp_ns, items: heard.append(items), 1.0),
+    ]
+    heard: list[dict[str, Any]] = []
+    for on in (True, False):
+        medium.switched_on = on
+        legs[0]._step(0, {medium._state: "truth", "port": "block"})
+    assert heard == [{medium._state: "truth", "port": "block"}, {medium._state: "truth"}]
+    medium.destroy_node()
+
+
+class Plain(TickNode[MediumParameters], name="plain", namespace="/wayside"):
+    """Does nothing, and cannot be switched off."""
+
+    def setup(self) -> None:
+        self.inputs.clock()
+
+
+def test_a_node_that_cannot_be_switched_off_has_no_lifecycle(graph: Any) -> None:
+    plain = graph.add(Plain(context=graph.context))
+    services = {name for name, _ in plain.get_service_names_and_types_by_node("plain", "/wayside")}
+    assert "/wayside/plain/get_parameters" in services
+    assert "/wayside/plain/change_state" not in services
+
+
+@pytest.mark.parametrize(
+    ("from_s", "to_s", "counts"),
+    [
+        # At the edge of a tick, between two, in none, over the first one.
+        ((0.2,), (0.4,), [1, 2, None, None, 1, 2, 3]),
+        ((0.15,), (0.301,), [1, 2, None, None, 1, 2, 3]),
+        ((0.31,), (0.39,), [1, 2, 3, 4, 1, 2, 3]),
+        ((0.0, 0.5), (0.1, 0.6), [None, 1, 2, 3, 4, None, 1]),
+    ],
+)
+def test_equipment_is_switched_off_at_simulated_times(
+    graph: Any, from_s: tuple[float], to_s: tuple[float], counts: list[int | None]
+) -> None:
+    site = Site(graph, off_from_s=from_s, off_to_s=to_s)
+    seen: list[float | None] = []
+    for tick in range(7):
+        count = site.tick(tick, 1.0)
+        seen.append(count if site.node.switched_on else None)
+        assert site.node._is_active is site.node.switched_on
+    assert seen == counts
+    if None in counts:
+        said = f"switched off from {from_s[0]:g} s to {to_s[0]:g} s"
+        graph.wait(lambda: said in [message for _, message in graph.told("counter: equipment")])
+
+
+def test_what_is_late_is_judged_by_its_own_stamp(graph: Any) -> None:
+    site = Site(graph, off_from_s=(0.2,), off_to_s=(0.4,))
+    on = {}
+    for tick in (0, 1, 3, 1, 4, 3, 5):
+        site.node.begin_step(tick * TICK_NS)
+        on[len(on), tick] = site.node.switched_on
+    assert [tick for (_, tick), is_on in on.items() if is_on] == [0, 1, 1, 4, 5]
+
+
+def test_who_switches_by_hand_keeps_what_he_has_set(graph: Any) -> None:
+    site = Site(graph, off_from_s=(0.2,), off_to_s=(0.4,))
+    site.switch(Transition.TRANSITION_DEACTIVATE)
+    site.tick(1, 1.0)
+    assert not site.node.switched_on
+    site.tick(2, 1.0)
+    site.switch(Transition.TRANSITION_ACTIVATE)  # in vain: the fault lasts
+    site.tick(3, 1.0)
+    assert not site.node.switched_on
+    site.tick(4, 1.0)
+    assert site.node.switched_on
+    site.switch(Transition.TRANSITION_DEACTIVATE)
+    site.tick(5, 1.0)
+    assert not site.node.switched_on
+
+
+@pytest.mark.parametrize(
+    ("wrong", "line"),
+    [
+        ({"off_from_s": (1.0,)}, "off_to_s: (): one for each of off_from_s, (1.0,)"),
+        ({"off_from_s": (1.0,), "off_to_s": (1.0,)}, "each must be after"),
+        ({"off_from_s": (1.0, 2.0), "off_to_s": (2.0, 3.0)}, "must be in order and apart"),
+    ],
+)
+def test_off_times_that_do_not_fit_are_one_line(
+    graph: Any, wrong: dict[str, Any], line: str
+) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Counter(context=graph.context, parameters=wrong, services=False)
+    assert line in str(caught.value)
 
 
 def test_a_receiver_that_is_switched_on_again_has_received_nothing(graph: Any) -> None:

@@ -31,13 +31,14 @@ class Recorder:
     def __init__(self) -> None:
         self.now_s = 0.0
         self.times: list[int] = []
+        self.steps: list[int] = []
         self.feed: dict[str, Callable[[bytes], None]] = {}
         self.failed: list[tuple[str, str]] = []
         self.listens: list[Topic] = []
         self._timers: list[Callable[[], None]] = []
         self.ticks: list[tuple[int, dict[str, Any]]] = []
 
-    def blocks_in(
+    def items_in(
         self,
         topic: Topic,
         decode: Callable[[bytes], tuple[int, Any]],
@@ -64,6 +65,9 @@ class Recorder:
 
     def at_tick(self, stamp_ns: int) -> None:
         self.times.append(stamp_ns)
+
+    def begin_step(self, stamp_ns: int) -> None:
+        self.steps.append(stamp_ns)
 
     def get_fully_qualified_name(self) -> str:
         return "/node"

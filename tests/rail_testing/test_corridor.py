@@ -164,7 +164,7 @@ def test_equipment_is_switched_and_starts_knowing_nothing(corridor: Make) -> Non
     c.step(3)
     assert ranges.latest.usable
     with pytest.raises(InputError, match="can be switched"):
-        c.switch_off("/wayside/zone_controller")
+        c.switch_off("/world")
 
 
 def test_what_a_node_under_test_raises_fails_the_test(corridor: Make) -> None:

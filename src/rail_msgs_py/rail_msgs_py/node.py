@@ -162,6 +162,9 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         """Subscribe to serialised messages of a topic of the table."""
         self._read_stream(topic, callback, None, parts)
 
+    def begin_step(self, stamp_ns: int) -> None:
+        """Be what the node is at a stamp: called before whatever it does of its own at a tick."""
+
     def blocks_in(
         self,
         topic: Topic,
@@ -169,7 +172,23 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         callback: Callable[[int, Any], None],
         **parts: object,
     ) -> None:
-        """Subscribe to a topic of the table; the callback takes stamp [ns] and item.
+        """Act on each message of a topic as it comes; the callback takes stamp [ns] and item."""
+        begin = self.begin_step
+
+        def step(stamp_ns: int, item: Any) -> None:
+            begin(stamp_ns)
+            callback(stamp_ns, item)
+
+        self.items_in(topic, decode, step, **parts)
+
+    def items_in(
+        self,
+        topic: Topic,
+        decode: Decoder[Any],
+        callback: Callable[[int, Any], None],
+        **parts: object,
+    ) -> None:
+        """Subscribe to a topic of the table, to collect what comes: stamp [ns] and item.
 
         What a node of the same process sends is not serialised on the way.
         """
@@ -357,6 +376,7 @@ class Equipment(CorridorMixin, LifecycleNode):  # type: ignore[misc]
             **node_arguments(context, parameters, services),
         )
         self.switched_on = False
+        self._off_words = "switched off"
         self.init_corridor()
 
     def switch_on(self) -> None:
@@ -395,5 +415,5 @@ class Equipment(CorridorMixin, LifecycleNode):  # type: ignore[misc]
     def on_deactivate(self, state: Any) -> Any:
         """Lifecycle transition."""
         self.switched_on = False
-        self.report(DiagnosticStatus.WARN, "equipment", "switched off")
+        self.report(DiagnosticStatus.WARN, "equipment", self._off_words)
         return super().on_deactivate(state)

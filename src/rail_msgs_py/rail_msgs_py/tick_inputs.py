@@ -94,7 +94,7 @@ class TickInputs:
             if complete:
                 advance()
 
-        self._node.blocks_in(topic, decode, receive, **parts)
+        self._node.items_in(topic, decode, receive, **parts)
         return port
 
     def port(
@@ -136,7 +136,7 @@ class TickInputs:
             if put(stamp_ns + delay_ns, port, item):
                 advance()
 
-        self._node.blocks_in(topic, decode, receive, **parts)
+        self._node.items_in(topic, decode, receive, **parts)
         return port
 
     def internal_port(
@@ -188,6 +188,7 @@ class TickInputs:
             stamp_ns, items = inbox.take()
             if self._first is None:
                 self._node.at_tick(stamp_ns)
+            self._node.begin_step(stamp_ns)
             self._step(stamp_ns, items)
             if second is not None:
                 second._begin_leg(stamp_ns)

@@ -27,7 +27,10 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, get_args
 
+from lifecycle_msgs.msg import State
+
 from .node import CorridorMixin, CorridorNode, Equipment, Services
+from .off_times import OffTimeParameters, OffTimes, off_times_of
 from .parameters import ParameterError, declare
 from .standalone import run_node
 from .tick_inputs import TickInputs
@@ -159,10 +162,20 @@ class TickNode(_Kind[Parameters], CorridorNode):
 class EquipmentNode(_Kind[Parameters], Equipment):
     """Managed node: equipment that can be switched off and on.
 
-    Switched off it still answers every tick; `switched_on` tells whether it is.
+    Switched off it still answers every tick; `switched_on` tells whether it is. Besides by hand it
+    is switched by the times of its `OffTimeParameters`: what it is in a step follows from the stamp
+    of that step alone, so that it is the same wherever the node runs.
     """
 
+    _off_times = OffTimes()
+
     def _build(self) -> None:
+        self._off_times = off_times_of(declare(self, OffTimeParameters))
+        #: Newest stamp that it has been switched for.
+        self._followed_ns = -1
+        #: Whether it is on but for its off times.
+        self._kept_on = True
+        self._switches_itself = False
         self.setup()
         self.start_over()
 
@@ -175,4 +188,47 @@ class EquipmentNode(_Kind[Parameters], Equipment):
     def on_activate(self, state: Any) -> Any:
         """Lifecycle transition."""
         self.start_over()
+        self._kept_on = True
         return super().on_activate(state)
+
+    def on_deactivate(self, state: Any) -> Any:
+        """Lifecycle transition."""
+        self._kept_on = self._switches_itself
+        return super().on_deactivate(state)
+
+    def take_off_times(self, times: OffTimes) -> None:
+        """Be switched off at these times from now on, instead of at those of its parameters."""
+        self._off_times = times
+
+    def begin_step(self, stamp_ns: int) -> None:
+        """Be switched on or off as the off times say of a stamp."""
+        if not self._off_times:
+            return
+        if stamp_ns > self._followed_ns:
+            before_ns, self._followed_ns = self._followed_ns, stamp_ns
+            self._follow_off_times(before_ns, stamp_ns)
+        self.switched_on = self._kept_on and self._off_times.at(stamp_ns) is None
+
+    def _follow_off_times(self, before_ns: int, stamp_ns: int) -> None:
+        """Make the transitions that are due after one stamp and not after another."""
+        now = self._off_times.at(stamp_ns)
+        ended = now is None and self._off_times.has_ended(before_ns, stamp_ns)
+        if now is None and not ended:
+            return
+        self.at_tick(stamp_ns)
+        self._switches_itself = True
+        if now is not None and self._is_active:
+            self._off_words = str(now)
+            self.trigger_deactivate()
+            self._off_words = "switched off"
+        elif ended and self._is_active:  # too short for a tick to fall into
+            self.start_over()
+        elif ended:
+            self.trigger_activate()
+        self._switches_itself = False
+
+    @property
+    def _is_active(self) -> bool:
+        """Whether the state of its life cycle is that of equipment that is switched on."""
+        machine: Any = self._state_machine
+        return bool(machine.current_state[0] == State.PRIMARY_STATE_ACTIVE)

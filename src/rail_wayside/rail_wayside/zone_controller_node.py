@@ -27,7 +27,7 @@ from rail_msgs_py.position import Position, PositionWriter
 from rail_msgs_py.quantities import GIVE_UP
 from rail_msgs_py.ranging.range_reading import RangeView, range_from_cdr
 from rail_msgs_py.table import TableWriter
-from rail_msgs_py.tick_node import TickNode
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.ranging import POSITION, RANGE
 from rail_msgs_py.topics.tick import DONE
 from rail_msgs_py.topics.train_radio import (
@@ -105,15 +105,14 @@ def zone_map_of(p: ZoneControllerParameters) -> ZoneMap:
 
 
 class ZoneControllerNode(
-    TickNode[ZoneControllerParameters], name="zone_controller", namespace="/wayside"
+    EquipmentNode[ZoneControllerParameters], name="zone_controller", namespace="/wayside"
 ):
-    """The zone controller as a node."""
+    """The zone controller as a managed node; switched off it knows no train and says nothing."""
 
     def setup(self) -> None:
         """Open the ports of all stations and base stations."""
         p = self._p
-        zone_map = zone_map_of(p)
-        self._tracker = ZoneTracker(zone_map, list(zip(p.trains, p.entry_zones, strict=True)))
+        self._map = zone_map = zone_map_of(p)
         self._positions = {name: self.publisher(POSITION, train=name).send for name in p.trains}
         self._writers: dict[tuple[str, str], PositionWriter] = {}
         # In the order of their names, so that sums over them are repeatable.
@@ -121,19 +120,24 @@ class ZoneControllerNode(
             name: self.inputs.port(RANGE, _READING, site=zone.site, zone=name)
             for name, zone in sorted(zone_map.zones.items())
         }
-        self._open_issuer()
+        self._open_radio()
         # The clock is a port like the others: a tick ends though no station answers.
         self.inputs.clock()
         self._done = self.stream_out(DONE, node=self.get_fully_qualified_name())
 
-    def _open_issuer(self) -> None:
-        """Begin to speak with trains."""
+    def start_over(self) -> None:
+        """Have seen no train, and have spoken with none."""
         p = self._p
+        self._tracker = ZoneTracker(self._map, list(zip(p.trains, p.entry_zones, strict=True)))
         self._issuer = authority_issuer_of(p)
+
+    def _open_radio(self) -> None:
+        """Open the ports of all base stations."""
+        p = self._p
         self._segments = {name: number for number, name in enumerate(p.segments)}
         # Without a desk there are no numbers.
         self._numbers = dict(zip(p.trains, p.train_numbers, strict=False))
-        trains = p.trains if self._issuer else ()
+        trains = p.trains if p.bases else ()
         self._authorities = {
             train: self.table_out(AUTHORITY, (train,), train=train) for train in trains
         }
@@ -147,12 +151,30 @@ class ZoneControllerNode(
 
     def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
         """Locate the trains, and give them authorities."""
+        if not self.switched_on:
+            self._keep_silent(stamp_ns)
+            return
         readings = {zone: items[port] for zone, port in self._zone_ports.items() if port in items}
         fixes = self._tracker.update(stamp_ns * 1e-9, readings)
         for fix in fixes:
             self._publish(stamp_ns, fix)
         self._authorise(stamp_ns, fixes, items)
         self._report_zones(stamp_ns)
+        self._done(header_to_cdr(stamp_ns))
+
+    def _keep_silent(self, stamp_ns: int) -> None:
+        """Answer a tick in which it is switched off."""
+        zones = self._map.zones
+        for train, zone in zip(self._p.trains, self._p.entry_zones, strict=True):
+            track, start_m = zones[zone].track, zones[zone].start_m
+            unknown = (track, start_m, math.inf, 0.0, math.inf, "switched off")
+            self._publish(stamp_ns, TrainFix(train, zone, *unknown))
+        for publish_reports in self._reports.values():
+            publish_reports(_reports(stamp_ns, ()))
+        for send in self._down.values():
+            send(telegrams(stamp_ns))
+        for publish in self._authorities.values():
+            publish(stamp_ns, np.full((1, len(AUTHORITY.columns)), math.nan))
         self._done(header_to_cdr(stamp_ns))
 
     def _authorise(

@@ -10,8 +10,8 @@ from rail_msgs_py.decoders import table
 from rail_msgs_py.headers import header_to_cdr
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.quantities import GIVE_UP
-from rail_msgs_py.tick_inputs import TickInputs
-from rail_msgs_py.tick_node import TickNode
+from rail_msgs_py.tick_inputs import Step, TickInputs
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.tick import DONE
 from rail_msgs_py.topics.world import STATE
 
@@ -29,11 +29,15 @@ class MediumParameters:
 Parameters = TypeVar("Parameters", bound=MediumParameters)
 
 
-class MediumNode(TickNode[Parameters]):
+class MediumNode(EquipmentNode[Parameters]):
     """Node of a medium: `on_tick` takes what is sent and delivers what arrives.
 
-    The tick of the medium is done when `on_tick` has returned.
+    The tick of the medium is done when `on_tick` has returned. Switched off it is dead air, where
+    nothing of what is sent arrives: a leg of a tick is opened by `leg`, and takes none of it.
     """
+
+    #: Port of the true state of all trains, which is nothing that is sent.
+    _truth_port = ""
 
     def _build(self) -> None:
         self._world = read_world_file(self._p.world_file)
@@ -44,7 +48,17 @@ class MediumNode(TickNode[Parameters]):
     @cached_property
     def inputs(self) -> TickInputs:
         """What `on_tick` waits for."""
-        return TickInputs(self, self._on_tick, self._p.timeout_s)
+        return self.leg(self._on_tick, self._p.timeout_s)
+
+    def leg(self, step: Step, timeout_s: float, **how: Any) -> TickInputs:
+        """Inputs of one leg of a tick; ``how`` as of `TickInputs`."""
+
+        def carry(stamp_ns: int, items: dict[str, Any]) -> None:
+            if not self.switched_on:
+                items = {port: items[port] for port in items if port == self._truth_port}
+            step(stamp_ns, items)
+
+        return TickInputs(self, carry, timeout_s, **how)
 
     def _on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
         self.on_tick(stamp_ns, items)
@@ -88,4 +102,5 @@ class MediumNode(TickNode[Parameters]):
 
     def state_port(self, inputs: TickInputs, trains: int) -> str:
         """Port of the true state of all trains, an array [train, column]; it begins the tick."""
-        return inputs.trigger(STATE, table(STATE, trains))
+        self._truth_port = inputs.trigger(STATE, table(STATE, trains))
+        return self._truth_port

@@ -18,7 +18,7 @@ from rail_corridor.equipment.track_code.subsystem import TRACK_CODE
 from rail_corridor.equipment.train_bus.subsystem import TRAIN_BUS
 from rail_corridor.equipment.train_radio.subsystem import TRAIN_RADIO
 from rail_corridor.errors import InputError
-from rail_corridor.scenario.faults import Fault, TrainStopFault, WheelSlipFault
+from rail_corridor.scenario.faults import COMMON_FAULTS, Fault
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import tick, world
 from rail_msgs_py.topics.topic import Topic
@@ -106,7 +106,7 @@ def _shape(topic: Topic) -> str:
 _OWN: Final[dict[str, list[str]]] = {
     "name": [],
     "section": [*Scenario.model_fields],
-    "kind of fault": [_kind_of_fault(fault) for fault in (TrainStopFault, WheelSlipFault)],
+    "kind of fault": [_kind_of_fault(fault) for fault in COMMON_FAULTS],
     "option": [],
     "kind of node": [WORLD.name],
     "topic": [_shape(topic) for topic in (*tick.TOPICS, *world.TOPICS)],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rail_corridor.equipment.off_times import check_off_times
 from rail_corridor.equipment.registry import subsystems
 from rail_corridor.errors import InputError, from_world
 from rail_corridor.scenario.faults import TrainStopFault, WheelSlipFault
@@ -51,6 +52,7 @@ def check_scenario(scenario: Scenario, train_fields: Sequence[str]) -> None:
     for subsystem in subsystems():
         subsystem.check(scenario, train_fields)
     _check_supervision(scenario)
+    check_off_times(scenario)
 
 
 def _check_places_of_trains(trains: Sequence[TrainDescription], fields: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 from pydantic import BaseModel, Field, create_model
 
 from rail_corridor.equipment.registry import subsystems
-from rail_corridor.scenario.faults import Fault, TrainStopFault, WheelSlipFault
+from rail_corridor.scenario.faults import COMMON_FAULTS, Fault
 from rail_corridor.scenario.model import Scenario
 
 
@@ -39,7 +39,7 @@ def scenario_model() -> type[Scenario]:
 
 
 def _kinds_of_faults() -> tuple[type[Fault], ...]:
-    return (TrainStopFault, WheelSlipFault, *(f for each in subsystems() for f in each.faults))
+    return (*COMMON_FAULTS, *(f for each in subsystems() for f in each.faults))
 
 
 def parse_scenario(data: object) -> Scenario:

@@ -11,6 +11,7 @@ from typing import Final, Literal
 import numpy as np
 
 from rail_corridor.equipment.node_spec import NodeSpec, Side
+from rail_corridor.equipment.off_times import with_off_times
 from rail_corridor.equipment.registry import (
     node_kinds,
     odometer_error_of,
@@ -154,7 +155,8 @@ def make_plan(
     world_path = run_directory / "world.json"
     world_path.write_text(world.model_dump_json())
     context = PlanContext(str(world_path), timeout_s, subsystems())
-    nodes = [spec for each in subsystems() for spec in each.plan(scenario, context)]
+    planned = [spec for each in subsystems() for spec in each.plan(scenario, context)]
+    nodes = with_off_times(scenario, planned)
     kinds = node_kinds()
     clocked = {spec.name for spec in nodes if kinds[spec.kind].clocked}
     supervision = supervision_of(scenario)

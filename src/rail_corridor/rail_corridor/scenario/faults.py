@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -42,9 +42,25 @@ class TrainStopFault(TimedFault):
     train: Name = Field(description="the train")
 
 
+class EquipmentOffFault(TimedFault):
+    """Equipment that is switched off; switched on again it knows nothing of before.
+
+    Where times of one equipment overlap or touch, they are one.
+    """
+
+    kind: Literal["equipment_off"]
+    node: str = Field(
+        max_length=200, description="full name of a node, as `/wayside/wrs1` or `/train_1/atp`"
+    )
+
+
 class WheelSlipFault(TimedFault):
     """Wheels that turn faster or slower than the train runs."""
 
     kind: Literal["wheel_slip"]
     train: Name = Field(description="the train")
     ratio: StrictFloat = field_of(SLIP_RATIO)
+
+
+#: Kinds that befall a corridor whatever equipment is in it.
+COMMON_FAULTS: Final[tuple[type[Fault], ...]] = (TrainStopFault, WheelSlipFault, EquipmentOffFault)

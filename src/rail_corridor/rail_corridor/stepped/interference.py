@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
+from rail_corridor.equipment.off_times import off_times, with_off_times
 from rail_corridor.errors import InputError
 from rail_corridor.plan.plan import WORLD
 from rail_corridor.plan.world_plan import world_file
 from rail_corridor.scenario.model import Scenario
+from rail_msgs_py.off_times import OffTime, OffTimes
+from rail_msgs_py.tick_node import EquipmentNode
 
 from .corridor import StalledError, SteppedCorridor
 
@@ -153,6 +157,7 @@ class Interference:
             If a medium reads its faults at the start alone, or is in another process.
         """
         corridor = self._corridor
+        self._change_off_times(scenario)
         for spec in corridor.plan.nodes:
             if spec.side == "world" and spec.name not in corridor.nodes:
                 reason = "is in a process of its own, and reads faults at the start"
@@ -162,6 +167,21 @@ class Interference:
             if hasattr(node, "take_faults"):
                 node.take_faults(world)
         corridor.scenario = scenario
+
+    def _change_off_times(self, scenario: Scenario) -> None:
+        """Let equipment be switched off at other times."""
+        corridor = self._corridor
+        before, after = off_times(corridor.scenario), off_times(scenario)
+        for name in {*before, *after}:
+            times = after.get(name, [])
+            if times == before.get(name, []):
+                continue
+            node = corridor.nodes.get(name)
+            if not isinstance(node, EquipmentNode):
+                raise LookupError(f"{name} is not here, or no equipment that can be switched")
+            node.take_off_times(OffTimes(OffTime(*each) for each in times))
+        nodes = tuple(with_off_times(scenario, corridor.plan.nodes))
+        corridor.plan = replace(corridor.plan, nodes=nodes)
 
     def _refuse_world(self, name: str) -> None:
         self._corridor.spec(name)

@@ -84,7 +84,6 @@ class TrainBusMonitorNode(
         edge = step_edge(self._time_s, p.rise_time_s)
         self._edges = np.tile(edge, (p.traces, 1)).astype(np.complex128)
         self._tick_ns = round(p.tick_s * NANOSECONDS)
-        self._due_ns = round(p.offset_s * NANOSECONDS)
         # What was seen in a tick decides on measuring in the next.
         self._is_seen = self.inputs.internal_port("bus", p.medium, delay_ns=self._tick_ns)
         self._send = self.stream_out(REFLECTOMETER_TX, train=train)
@@ -99,6 +98,7 @@ class TrainBusMonitorNode(
         """Have measured nothing."""
         self._watch_over = BusWatch(self._read)
         self._level = 0
+        self._due_ns = round(self._p.offset_s * NANOSECONDS)
 
     def _read(self, traces: Reflectogram) -> TraceReading:
         rate = self._p.false_alarm_rate

@@ -100,6 +100,11 @@ class WrsNode(EquipmentNode[WrsParameters], name="wrs1", namespace="/wayside"):
             self.blocks_in(WRS_RX, samples, receive, site=site, zone=zone)
         self.blocks_in(CLOCK, bare_stamp, self._on_clock)
 
+    def start_over(self) -> None:
+        """Have received nothing."""
+        for antenna in self._antennas:
+            antenna.disturbance = ""
+
     def _check_parameters(self) -> None:
         p = self._p
         per_zone = (p.zones, p.downlink_channels, p.uplink_channels, p.downlink_carriers_hz)

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from rail_msgs_py.tick_inputs import TickInputs
 from rail_msgs_py.topics.ranging import LINKS, VRS_RX, VRS_TX, WRS_RX, WRS_TX
 from rail_msgs_py.waveform import BlockReader, RepeatedBlock, Waveform, WaveformView, silence
 from rail_world.medium_node import MediumNode, MediumParameters
@@ -36,7 +35,7 @@ class RadioMediumNode(MediumNode[RadioMediumParameters], name="radio_medium", na
         self._trains = radio.trains
         self._downlink_of = {s.uplink_channel: s.downlink_channel for s in radio.stations}
         channels = sorted({antenna.downlink_channel for antenna in radio.stations})
-        downlink = TickInputs(self, self._on_downlink, self._p.timeout_s, then=self.inputs)
+        downlink = self.leg(self._on_downlink, self._p.timeout_s, then=self.inputs)
         self._state = self.state_port(downlink, len(radio.trains))
         self._station_ports = [
             downlink.port(WRS_TX, BlockReader().decoder(), site=antenna.site, zone=antenna.zone)

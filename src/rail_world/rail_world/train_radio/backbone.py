@@ -64,6 +64,11 @@ class Backbone:
         #: Frames carried; what the intruder adds is none of them.
         self.frames = 0
 
+    def start_over(self) -> None:
+        """Lose what the network has learnt and holds; the intruder keeps what is his."""
+        self._by.clear()
+        self._arrived.clear()
+
     @property
     def strikes(self) -> Counter[Threat]:
         """How often each threat has struck."""

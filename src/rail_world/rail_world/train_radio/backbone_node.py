@@ -7,7 +7,7 @@ the zone controller's ``telegrams`` for each. Topics out: ``~/<base>/uplink_tele
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -62,7 +62,7 @@ class BackboneNode(MediumNode[BackboneParameters], name="backbone", namespace="/
             bases, self.part("threats", ThreatsDescription).periods, np.random.Generator(bits)
         )
         read = stamped(Telegrams.from_cdr)
-        up = TickInputs(self, self._carry_up, self._p.timeout_s, then=self.inputs)
+        up = self.leg(self._carry_up, self._p.timeout_s, then=self.inputs)
         up.clock()
         self._up_ports = {base: up.port(UP_TELEGRAMS, read, base=base) for base in bases}
         self._down_ports = {
@@ -76,20 +76,30 @@ class BackboneNode(MediumNode[BackboneParameters], name="backbone", namespace="/
     def inputs(self) -> TickInputs:
         """What the second leg waits for; the controller has its time from the clock on."""
         timeout_s = self._p.controller_timeout_s
-        return TickInputs(self, self._on_tick, timeout_s, timed_from="tick")
+        return self.leg(self._on_tick, timeout_s, timed_from="tick")
+
+    def start_over(self) -> None:
+        """Know no way to any train, and have nothing under way."""
+        self._backbone.start_over()
 
     def _carry_up(self, stamp_ns: int, items: Mapping[str, Any]) -> None:
         """Bring the controller what the base stations have received."""
-        carried = self._backbone.up(stamp_ns, _frames(self._up_ports, items))
+        carried = self._carried(self._backbone.up, stamp_ns, _frames(self._up_ports, items))
         _publish(self._up_out, stamp_ns, carried)
 
     def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
         """Bring the base stations what the controller sends; the second leg."""
-        carried = self._backbone.down(stamp_ns, _frames(self._down_ports, items))
+        carried = self._carried(self._backbone.down, stamp_ns, _frames(self._down_ports, items))
         _publish(self._down_out, stamp_ns, carried)
         strikes = self._backbone.strikes
         values = [self._backbone.frames, *(strikes[threat] for threat in Threat)]
         self._strikes(stamp_ns, np.array([values], dtype=np.float64))
+
+    def _carried(
+        self, carry: Callable[[int, Carried], Carried], stamp_ns: int, frames: Carried
+    ) -> Carried:
+        """What comes out; switched off nothing does, whoever sends."""
+        return carry(stamp_ns, frames) if self.switched_on else {base: [] for base in self._up_out}
 
 
 def _frames(ports: Mapping[str, str], items: Mapping[str, Telegrams]) -> Carried:

@@ -301,12 +301,9 @@ class WorldNode(TickNode[WorldParameters], name="world"):
 
     def _on_command(self, port: str, raw: bytes) -> None:
         stamp_ns, values = values_from_cdr(raw, 1, len(COMMAND.columns))
-        permitted_mps, _, service_brake, emergency_brake = values[0].tolist()
-        command = DriveCommand(
-            permitted_mps if self._p.cab_signals else inf,
-            service_brake=service_brake > 0.0,
-            emergency_brake=emergency_brake > 0.0,
-        )
+        permitted_mps, _, *demands = values[0].tolist()
+        heeded_mps = permitted_mps if self._p.cab_signals else inf
+        command = DriveCommand(heeded_mps, *(demand > 0.0 for demand in demands))
         self._inbox.put(stamp_ns, port, command)
         self._advance()
 

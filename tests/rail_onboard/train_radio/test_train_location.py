@@ -31,7 +31,7 @@ def test_nothing_is_known_before_a_fix_and_an_odometer() -> None:
 @pytest.mark.parametrize("fix_s", [0.0, 1.5, 3.25, 5.0])
 def test_a_fix_is_brought_to_now_by_the_odometer(direction: int, fix_s: float) -> None:
     where = running(direction=direction)
-    assert where.fix(fix_s, 1000.0, 3.0)
+    assert where.place(fix_s, 1000.0, 3.0)
     run_m = SPEED * (5.0 - fix_s)
     here = where.location(5.0)
     assert here.position_m == pytest.approx(1000.0 + direction * run_m)
@@ -44,7 +44,7 @@ def test_between_ticks_a_change_of_speed_is_allowed_for() -> None:
     where = TrainLocation(0.0)
     where.update(0.0, 0.0, 10.0)
     where.update(2.0, 18.0, 8.0)  # 10 m/s, falling to 8 at 1 s at once
-    where.fix(1.0, 100.0, 0.0)
+    where.place(1.0, 100.0, 0.0)
     here = where.location(2.0)
     assert here.uncertainty_m == pytest.approx(0.25 * 2.0 * 2.0)
     assert here.position_m - here.uncertainty_m == pytest.approx(108.0)
@@ -52,7 +52,7 @@ def test_between_ticks_a_change_of_speed_is_allowed_for() -> None:
 
 def test_a_narrower_fix_is_intersected_with_what_is_known() -> None:
     where = running(error=0.0)
-    where.fix(5.0, 100.0, 4.0)  # 96 to 104
+    where.place(5.0, 100.0, 4.0)  # 96 to 104
     where.fix(5.0, 102.0, 3.0)  # 99 to 105
     here = where.location(5.0)
     assert (here.position_m, here.uncertainty_m) == (101.5, 2.5)
@@ -63,7 +63,7 @@ def test_a_narrower_fix_is_intersected_with_what_is_known() -> None:
 
 def test_a_train_at_a_stand_does_not_erode_its_interval() -> None:
     where = running()
-    where.fix(5.0, 100.0, 4.0)
+    where.place(5.0, 100.0, 4.0)
     for n in range(50):
         where.update(6.0 + n, 100.0, 0.0)
         where.fix(6.0 + n, 100.0 + math.sin(n), 4.0)
@@ -72,14 +72,14 @@ def test_a_train_at_a_stand_does_not_erode_its_interval() -> None:
 
 def test_fixes_that_contradict_each_other_leave_the_hull_until_one_agrees() -> None:
     where = running(error=0.0)
-    where.fix(5.0, 100.0, 2.0)
+    where.place(5.0, 100.0, 2.0)
     assert where.fix(5.0, 110.0, 3.0)
     here, agreed = where.location(5.0), where.consistent
     assert not agreed
     assert (here.position_m, here.uncertainty_m, here.valid) == (105.5, 7.5, True)
-    where.fix(5.0, 101.0, 2.0)
+    where.fix(5.0, 101.0, 1.5)
     assert where.consistent
-    assert where.location(5.0).position_m == 101.0
+    assert where.location(5.0).position_m == 100.75
 
 
 def test_fixes_from_the_future_or_from_before_the_history_are_refused() -> None:
@@ -89,7 +89,7 @@ def test_fixes_from_the_future_or_from_before_the_history_are_refused() -> None:
     assert not where.fix(10.1, 1000.0, 1.0)
     assert not where.fix(6.9, 1000.0, 1.0)
     assert where.location(10.0) == NOWHERE
-    assert where.fix(7.1, 1000.0, 1.0)
+    assert where.place(7.1, 1000.0, 1.0)
     assert where.location(8.0).position_m == pytest.approx(1018.0)
     assert where.location(10.1) == NOWHERE
     assert where.location(6.0) == NOWHERE
@@ -107,7 +107,7 @@ def test_memory_is_bounded() -> None:
 def test_steps_backwards_forget_everything() -> None:
     for time_s, distance_m in ((4.0, 100.0), (6.0, 99.0)):
         where = running()
-        where.fix(5.0, 100.0, 1.0)
+        where.place(5.0, 100.0, 1.0)
         assert where.location(5.0).valid
         assert where.update(time_s, distance_m, SPEED)
         assert where.location(time_s) == NOWHERE
@@ -117,7 +117,7 @@ def test_steps_backwards_forget_everything() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_what_is_not_finite_is_not_accepted(bad: float) -> None:
     where = running()
-    where.fix(5.0, 100.0, 1.0)
+    where.place(5.0, 100.0, 1.0)
     here = where.location(5.0)
     for reading in ((bad, 120.0, SPEED), (6.0, bad, SPEED), (6.0, 120.0, bad)):
         assert not where.update(*reading)
@@ -187,7 +187,8 @@ def test_the_front_is_always_in_the_interval(
             t0, s0, v0, a0 = max(entry for entry in path if entry[0] <= true_s)
             then = s0 + v0 * (true_s - t0) + 0.5 * a0 * (true_s - t0) ** 2
             before = where.location(time_s)
-            assert where.fix(true_s, direction * (then + off * half_m), half_m)
+            take = where.fix if before.valid else where.place
+            assert take(true_s, direction * (then + off * half_m), half_m)
             assert where.consistent
             worst = direction * before.position_m + before.uncertainty_m
             here = where.location(time_s)

@@ -52,6 +52,7 @@ def check_scenario(scenario: Scenario, train_fields: Sequence[str]) -> None:
     for subsystem in subsystems():
         subsystem.check(scenario, train_fields)
     _check_supervision(scenario)
+    _check_actions(scenario)
     check_off_times(scenario)
 
 
@@ -92,6 +93,17 @@ def _check_faults(scenario: Scenario) -> None:
                 f"there is no such train, they are {', '.join(trains)}",
                 field=f"faults.{index}.train",
                 value=fault.train,
+            )
+
+
+def _check_actions(scenario: Scenario) -> None:
+    trains = [train.name for train in scenario.trains]
+    for index, action in enumerate(scenario.actions):
+        if action.train not in trains:
+            raise InputError(
+                f"there is no such train, they are {', '.join(trains)}",
+                field=f"actions.{index}.train",
+                value=action.train,
             )
 
 

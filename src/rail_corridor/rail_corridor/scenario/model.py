@@ -17,6 +17,7 @@ from rail_world.line.description_base import Description, Name, StrictFloat, fie
 from rail_world.line.network import Network, build_network
 from rail_world.trains.description import TrainDescription
 
+from .actions import ReleaseOnSight
 from .faults import Fault
 from .section_fields import StrictInt
 from .timetable import Timetable
@@ -51,6 +52,9 @@ class Scenario(Description):
     )
     faults: tuple[SerializeAsAny[Fault], ...] = Field(
         default=(), max_length=1000, description="what goes wrong, and when"
+    )
+    actions: tuple[ReleaseOnSight, ...] = Field(
+        default=(), max_length=1000, description="what people do, and when"
     )
 
     @model_validator(mode="after")

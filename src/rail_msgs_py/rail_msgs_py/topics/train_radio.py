@@ -206,6 +206,16 @@ ATP_STATE: Final = Topic(
             "chainage that the front must not pass, NaN without an authority",
         ),
         Column("authority_age_s", "time since the authority was sealed, infinite without one"),
+        Column(
+            "mode",
+            "0 position not known, train is held; 1 located, stands; 2 moving under supervision; "
+            "3 on sight, released by a person",
+        ),
+        Column(
+            "odometer_doubted",
+            "1 if wheels slide or spin, by physics or by ranges, and distances are bounded by "
+            "physics; else 0",
+        ),
     ),
 )
 REPORTS: Final = Topic(

@@ -141,6 +141,11 @@ COMMAND: Final = Topic(
         Column("warning", "1 if the driver is warned, else 0"),
         Column("service_brake", "1 if the service brake is demanded, else 0"),
         Column("emergency_brake", "1 if the emergency brake is demanded, else 0; it goes before"),
+        Column("traction_cut_off", "1 if the motors get no current, else 0"),
+        Column(
+            "on_sight",
+            "1 if the driver is to run on sight, able to stop short of any obstacle, else 0",
+        ),
     ),
     awaited=True,
 )

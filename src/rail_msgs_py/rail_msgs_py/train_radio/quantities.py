@@ -64,6 +64,10 @@ AUTHORITY_TIMEOUT: Final = Quantity(
     3.0, "age of an authority that makes a train brake", unit="s", low=0.5, high=60.0
 )
 
+ON_SIGHT: Final = Quantity(
+    15.0 / 3.6, "speed permitted to a train on sight", unit="m/s", low=0.5, high=12.0
+)
+
 THREAT_RATE: Final = Quantity(
     NEEDED, "probability of each for a frame, either way", low=0.0, high=1.0
 )

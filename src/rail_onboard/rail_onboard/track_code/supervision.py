@@ -123,6 +123,8 @@ class SupervisionOutput:
     service_brake: bool
     emergency_brake: bool
     reason: str
+    traction_cut_off: bool = False
+    on_sight: bool = False
 
 
 @dataclass(frozen=True)

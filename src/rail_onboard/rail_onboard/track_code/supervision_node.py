@@ -96,6 +96,8 @@ class CodeSupervisionNode(
             float(output.warning),
             float(output.service_brake),
             float(emergency),
+            float(output.traction_cut_off),
+            float(output.on_sight),
         ]
         self._command(stamp_ns, np.array([values]))
         intervenes = emergency or output.service_brake

@@ -35,12 +35,21 @@ from rail_onboard.braking_curve import GuaranteedBraking
 from rail_onboard.localizer.protected_interval import protected_interval
 from rail_onboard.track_code.supervision import SupervisionOutput, Thresholds
 
+from .odometer_watch import RunningLimits
 from .supervision import AuthoritySupervision
-from .train_location import NOWHERE, Location, TrainLocation
-from .train_protection import TrainIdentity, TrainProtection
+from .train_location import Location, TrainLocation
+from .train_modes import ModeSupervision, TrainMode
+from .train_protection import LocalizerView, TrainIdentity, TrainProtection
 
 _NOT_RELAYED = (nan, nan, inf)
 _OFF = SupervisionOutput(0.0, True, True, True, "switched off")
+_MODES = {
+    TrainMode.NOT_KNOWN: "position not known: held until it is located",
+    TrainMode.LOCATED: "located, stands",
+    TrainMode.MOVING: "moving under supervision",
+    TrainMode.ON_SIGHT: "on sight, released by a person",
+}
+_SUPERVISED = (TrainMode.LOCATED, TrainMode.MOVING)
 
 
 @dataclass(frozen=True)
@@ -60,6 +69,21 @@ class AtpParameters:
     traction_mps2: float = parameter(
         1.0, "most acceleration of its motors", unit="m/s^2", low=0.0, high=5.0
     )
+    most_braking_mps2: float = parameter(
+        2.5,
+        "most deceleration by brakes, resistance and rise together; wheels that lose speed faster "
+        "slide",
+        unit="m/s^2",
+        low=0.1,
+        high=10.0,
+    )
+    fastest_mps: float = parameter(
+        100.0, "speed that the train never exceeds", unit="m/s", low=0.1, high=200.0
+    )
+    releases_s: tuple[float, ...] = parameter(
+        (), "simulated times at which a person releases it to run on sight", unit="s", low=0.0
+    )
+    on_sight_mps: float = quantities.ON_SIGHT.parameter()
     margin_m: float = parameter(
         5.0, "kept before the end of authority", unit="m", low=0.0, high=1e4
     )
@@ -100,9 +124,24 @@ def protection_of(p: AtpParameters, restarts: int = 0) -> TrainProtection:
         braking=braking,
         thresholds=thresholds,
     )
+    modes = ModeSupervision(
+        supervision,
+        releases_s=p.releases_s,
+        on_sight_mps=p.on_sight_mps,
+        timeout_s=p.authority_timeout_s,
+        thresholds=thresholds,
+    )
+    limits = RunningLimits(
+        accelerating_mps2=max(braking.gathering_mps2, 0.1),
+        braking_mps2=p.most_braking_mps2,
+        sure_braking_mps2=braking.service_deceleration_mps2,
+        delay_s=delay_s,
+        fastest_mps=p.fastest_mps,
+    )
     channel = train_end(p.secret, p.seed, p.number, p.tick_s, restarts)
     identity = TrainIdentity(p.number, p.segment, p.start_m, p.placed_m, p.length_m)
-    return TrainProtection(identity, channel, TrainLocation(p.odometer_error), supervision)
+    location = TrainLocation(p.odometer_error, limits=limits)
+    return TrainProtection(identity, channel, location, modes)
 
 
 class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
@@ -137,19 +176,16 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
         received = items.get(self._radio)
         frames = received.in_slot(self._p.number) if received else []
         protection = self._protection
-        place, fastest_mps, doubt_mps = None, None, 0.0
-        if self._p.localizer:
-            known = protected_interval(items.get(self._localizer))
-            place = NOWHERE
-            if known is not None:
-                place = Location(known.low_m + known.half_m, known.half_m, True)
-                speed_mps = known.believed_mps
-                fastest_mps, doubt_mps = known.fastest_mps, known.doubt_mps
+        localizer, doubt_mps = None, 0.0
+        known = protected_interval(items.get(self._localizer)) if self._p.localizer else None
+        if known is not None:
+            place = Location(known.low_m + known.half_m, known.half_m, True)
+            localizer = LocalizerView(place, known.believed_mps, known.fastest_mps)
+            doubt_mps = known.doubt_mps
         out, sent = _OFF, []
         if self.switched_on:
-            out = protection.tick(stamp_ns, distance_m, speed_mps, frames, place, fastest_mps)
-            reported_mps = speed_mps if fastest_mps is None else fastest_mps
-            sent = [(self._p.number, protection.frame(stamp_ns, reported_mps))]
+            out = protection.tick(stamp_ns, distance_m, speed_mps, frames, localizer)
+            sent = [(self._p.number, protection.frame(stamp_ns))]
         self._send(telegrams(stamp_ns, sent))
         if self._p.localizer:
             newest = (
@@ -160,12 +196,20 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
         self._state(stamp_ns, values)
         # The driver keeps to it by his own speed, supervision judges the fastest it may be.
         permitted_mps = max(0.0, out.permitted_mps - doubt_mps)
-        command = [[permitted_mps, out.warning, out.service_brake, out.emergency_brake]]
-        self._command(stamp_ns, np.array(command, dtype=np.float64))
+        command = [permitted_mps, out.warning, out.service_brake, out.emergency_brake]
+        command += [out.traction_cut_off, out.on_sight]
+        self._command(stamp_ns, np.array([command], dtype=np.float64))
         self.report(
             DiagnosticStatus.WARN if out.reason else DiagnosticStatus.OK,
             "supervision",
             out.reason or "running",
+            stamp_ns=stamp_ns,
+        )
+        mode = protection.mode if self.switched_on else TrainMode.NOT_KNOWN
+        self.report(
+            DiagnosticStatus.OK if mode in _SUPERVISED else DiagnosticStatus.WARN,
+            "mode",
+            _MODES[mode],
             stamp_ns=stamp_ns,
         )
 

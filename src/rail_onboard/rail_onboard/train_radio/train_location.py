@@ -1,24 +1,39 @@
-"""Where the front of the train is: fixes told over the radio, carried on by the odometer.
+"""Where the front of the train is: ranges told over the radio, carried on by the odometer.
 
 With s the chainage times the direction of travel, what is known is an interval [l, h] that holds
 the front. The odometer counts d while the train truly runs between (1 - e) d and (1 + e) d, so
 
-    l += (1 - e) d,    h += (1 + e) d.
+    l += (1 - e) d,    h += (1 + e) d,
 
-A fix, true at a past time, is carried on in the same way from the odometer's reading at that time.
-A narrower one is used, and then **intersected** with what is known:
+or, where it is in doubt, by the bounds of physics (see ``odometer_watch``). A range, true at a past
+time, is carried on in the same way from the odometer's reading at that time.
+
+**Not known → located.** Without an interval, ranges make one as soon as ``LOCATING`` of them in a
+row agree with the odometer and with each other; a single one may be another train's.
+
+**A range that agrees** with what is known and is narrower is intersected with it:
 
 - The front is in both intervals if either bound holds, so in the intersection, whatever the order
-  in which the fixes come.
-- ``h``, the worst place for the supervision, is then never moved forwards by a fix, only by the
-  odometer: the permitted speed does not jump down because the noise of a fix changed its sign.
-- A fix that is not narrower is left alone: at a stand every one of a thousand fixes would
-  otherwise cut a bit off, and an intersection of n intervals of probability 1 - p each is good for
-  1 - n p only. As it is, the odometer must widen the interval before a fix is used again, so n is
+  in which the ranges come.
+- ``h``, the worst place for the supervision, is then never moved forwards by a range, only by the
+  odometer: the permitted speed does not jump down because the noise of a range changed its sign.
+- One that is not narrower is left alone: at a stand every one of a thousand ranges would otherwise
+  cut a bit off, and an intersection of n intervals of probability 1 - p each is good for 1 - n p
+  only. As it is, the odometer must widen the interval before a range is used again, so n is
   bounded by the distance run, and all but the last few of the n are widened far beyond p.
 
-An empty intersection means that one of the two is wrong, and it is not known which: the hull of
-both is taken, and flagged. The next fix that agrees with the hull and is narrower heals it.
+**A range that contradicts** it is one of two that are wrong: the hull of both is taken. The next
+range that agrees with the old interval heals it. Ranges that go on to contradict it, and agree with
+each other, are believed alone in the end: after ``DOUBTED`` of them if the odometer has been in
+doubt since it last agreed; after ``DRIFTED`` if a slide that could not be seen may have moved the
+train so far; after ``MISPLACED`` otherwise. Until then the front is in the hull if either is right.
+What is believed wrongly then needs ranges that are wrong alike for so long while the odometer
+counts: those of another train or of a wrong station, which the zone controller has checked.
+
+**Odometer and range are compared** over windows of ``WINDOW_S``: a way between two ranges that the
+wheels cannot have counted puts the odometer in doubt, one that they can have counted ends a doubt.
+Where the wheels step, slide or spin may just have ended: the interval grows by what they may have
+miscounted since a range last agreed.
 
 Between two ticks the odometer is interpolated linearly. Where the speed goes from v0 to v1 without
 turning, the distance at the fraction x of a tick t is at most x (1 - x) |v1 - v0| t off that line
@@ -31,7 +46,29 @@ from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import NamedTuple
+from typing import Final, NamedTuple
+
+from rail_onboard.track_code.supervision import STANDSTILL_MPS
+
+from .odometer_watch import OdometerWatch, RunningLimits
+
+
+class Confirmation(NamedTuple):
+    """Ranges in a row, and the time that they must span [s]."""
+
+    ranges: int
+    span_s: float
+
+
+LOCATING: Final = Confirmation(3, 1.0)
+DOUBTED: Final = Confirmation(3, 1.0)
+DRIFTED: Final = Confirmation(10, 10.0)
+MISPLACED: Final = Confirmation(10, 30.0)
+#: An unseen slide or spin miscounts at most this part of the way, and so much besides [m].
+UNSEEN_PART: Final = 0.5
+UNSEEN_M: Final = 20.0
+#: Ranges so far apart are compared with what the wheels counted between them [s].
+WINDOW_S: Final = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +98,46 @@ class _Reading(NamedTuple):
     time_s: float
     distance_m: float
     speed_mps: float
+    least_m: float  # run since the start, at the least and at the most
+    most_m: float
+
+
+class _Run(NamedTuple):
+    """Way run since a time: counted, least and most, and what interpolation adds to these [m]."""
+
+    counted_m: float
+    least_m: float
+    most_m: float
+    slack_m: float
+
+
+class _Range(NamedTuple):
+    time_s: float
+    low_m: float
+    high_m: float
+    counter_m: float  # of the odometer at that time
+
+
+@dataclass(slots=True)
+class _Interval:
+    """Interval of s at the latest reading, and the ranges in a row that it stands on."""
+
+    low_m: float
+    high_m: float
+    ranges: int = 1
+    since_s: float = 0.0
+
+    @property
+    def width_m(self) -> float:
+        return self.high_m - self.low_m
+
+    def overlaps(self, low_m: float, high_m: float) -> bool:
+        return low_m <= self.high_m and high_m >= self.low_m
+
+    def take(self, low_m: float, high_m: float) -> None:
+        """Intersect it with one that overlaps it, if that is narrower."""
+        if high_m - low_m < self.width_m:
+            self.low_m, self.high_m = max(low_m, self.low_m), min(high_m, self.high_m)
 
 
 class TrainLocation:
@@ -76,8 +153,10 @@ class TrainLocation:
         1 ± x of the way have x / (1 - x).)
     direction : {1, -1}
         1 if the train travels towards greater chainages. The odometer counts up either way.
+    limits : RunningLimits, optional
+        What the train can do; without it the odometer is believed.
     history_s : float
-        How old a fix may be [s].
+        How old a range may be [s].
     most_readings : int
         How many readings of the odometer are kept at most, however short the ticks.
 
@@ -91,7 +170,7 @@ class TrainLocation:
     >>> where = TrainLocation(0.01)
     >>> where.update(0.0, 500.0, 20.0), where.update(1.0, 520.0, 20.0)
     (True, True)
-    >>> where.fix(0.5, 1000.0, 2.0)
+    >>> where.place(0.5, 1000.0, 2.0)
     True
     >>> here = where.location(1.0)
     >>> here.position_m, round(here.uncertainty_m, 3), here.valid
@@ -103,6 +182,7 @@ class TrainLocation:
         odometer_error: float,
         *,
         direction: int = 1,
+        limits: RunningLimits | None = None,
         history_s: float = 10.0,
         most_readings: int = 1024,
     ) -> None:
@@ -116,16 +196,37 @@ class TrainLocation:
             raise ValueError(f"most_readings: {most_readings} is less than two")
         self._error, self._direction, self._history_s = odometer_error, direction, history_s
         self._readings: deque[_Reading] = deque(maxlen=most_readings)
+        self._watch = OdometerWatch(odometer_error, limits)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything, as when switched on."""
         self._readings.clear()
-        self._low_m, self._high_m = -inf, inf  # of s, at the latest reading
-        self.consistent = True
-        """Whether the last fix agreed with what was known before it."""
+        self._watch.reset()
+        self._known: _Interval | None = None
+        self._ranged: _Interval | None = None  # by ranges alone, not believed yet
+        self._agreed: _Range | None = None  # the last one that agreed with what was known
+        self._compared: _Range | None = None  # where the window of the comparison begins
+        self._doubt_s = -inf  # when the odometer was last in doubt
 
-    def update(self, time_s: float, distance_m: float, speed_mps: float) -> bool:
+    @property
+    def consistent(self) -> bool:
+        """Whether nothing contradicts what is known."""
+        return self._known is None or self._ranged is None
+
+    @property
+    def odometer_doubted(self) -> bool:
+        """Whether the wheels cannot count what the train runs."""
+        return self._watch.doubted
+
+    @property
+    def fastest_mps(self) -> float:
+        """The fastest that the train may run [m/s]."""
+        return self._watch.fastest_mps
+
+    def update(
+        self, time_s: float, distance_m: float, speed_mps: float, *, braked: bool = False
+    ) -> bool:
         """Take a reading of the odometer.
 
         Parameters
@@ -135,6 +236,8 @@ class TrainLocation:
             is forgotten [s], [m].
         speed_mps : float
             Of either sign [m/s].
+        braked : bool
+            Whether a brake has been demanded since the reading before.
 
         Returns
         -------
@@ -143,24 +246,55 @@ class TrainLocation:
         """
         if not (isfinite(time_s) and isfinite(distance_m) and isfinite(speed_mps)):
             return False
-        if self._readings:
-            last = self._readings[-1]
-            if time_s < last.time_s or distance_m < last.distance_m:
-                self.reset()
-            else:
-                run_m = distance_m - last.distance_m
-                self._low_m += (1.0 - self._error) * run_m
-                self._high_m += (1.0 + self._error) * run_m
-                if time_s == last.time_s:
-                    self._readings.pop()
-        self._readings.append(_Reading(time_s, distance_m, abs(speed_mps)))
+        last = self._readings[-1] if self._readings else None
+        if last is not None and (time_s < last.time_s or distance_m < last.distance_m):
+            self.reset()
+            last = None
+        if last is None:
+            self._watch.step(0.0, 0.0, abs(speed_mps), braked)
+            self._readings.append(_Reading(time_s, distance_m, abs(speed_mps), 0.0, 0.0))
+            return True
+        least_m, most_m = self._watch.step(
+            time_s - last.time_s, distance_m - last.distance_m, abs(speed_mps), braked
+        )
+        self._widen_for_step(time_s, distance_m)
+        for interval in (self._known, self._ranged):
+            if interval is not None:
+                interval.low_m += least_m
+                interval.high_m += most_m
+        if time_s == last.time_s:
+            self._readings.pop()
+        run = last.least_m + least_m, last.most_m + most_m
+        self._readings.append(_Reading(time_s, distance_m, abs(speed_mps), *run))
+        if self._watch.doubted:
+            self._doubt_s = time_s
         # One reading from before the history is kept, to interpolate from.
         while len(self._readings) > 1 and self._readings[1].time_s <= time_s - self._history_s:
             self._readings.popleft()
         return True
 
+    def _widen_for_step(self, time_s: float, distance_m: float) -> None:
+        """Allow for a slide or spin that nobody saw begin, and that this step may have ended."""
+        stepped, agreed, known = self._watch.stepped, self._agreed, self._known
+        if stepped is None:
+            return
+        self._compared = None
+        if agreed is None or known is None:
+            return
+        before_mps, after_mps = stepped
+        counted_m = max(0.0, self._readings[-1].distance_m - agreed.counter_m)
+        if after_mps < before_mps:
+            known.low_m -= (1.0 - after_mps / before_mps) * counted_m
+        elif before_mps > STANDSTILL_MPS:
+            most_m = max(0.0, after_mps * (time_s - agreed.time_s) - counted_m)
+            known.high_m += min((after_mps / before_mps - 1.0) * counted_m, most_m)
+
+    def place(self, time_s: float, position_m: float, uncertainty_m: float) -> bool:
+        """Take a place that is known for sure, such as data entry; parameters as of `fix`."""
+        return self._take(time_s, position_m, uncertainty_m, sure=True)
+
     def fix(self, time_s: float, position_m: float, uncertainty_m: float) -> bool:
-        """Take a fix.
+        """Take a range.
 
         Parameters
         ----------
@@ -173,42 +307,97 @@ class TrainLocation:
         -------
         bool
             Whether it was accepted: it is finite and neither from the future nor from before the
-            history. An accepted fix need not change anything.
+            history. An accepted range need not change anything.
         """
+        return self._take(time_s, position_m, uncertainty_m, sure=False)
+
+    def _take(self, time_s: float, position_m: float, uncertainty_m: float, *, sure: bool) -> bool:
         if not (isfinite(position_m) and 0.0 <= uncertainty_m < inf):
             return False
-        counted = self._run_since(time_s)
-        if counted is None:
+        run = self._run_since(time_s)
+        if run is None:
             return False
-        run_m, slack_m = counted
         s = self._direction * position_m
-        half_m = uncertainty_m + slack_m
-        low_m = s - half_m + (1.0 - self._error) * run_m
-        high_m = s + half_m + (1.0 + self._error) * run_m
-        self.consistent = low_m <= self._high_m and high_m >= self._low_m
-        if not self.consistent:
-            self._low_m, self._high_m = min(low_m, self._low_m), max(high_m, self._high_m)
-        elif high_m - low_m < self._high_m - self._low_m:
-            self._low_m, self._high_m = max(low_m, self._low_m), min(high_m, self._high_m)
+        low_m, high_m = s - uncertainty_m, s + uncertainty_m
+        counter_m = self._readings[-1].distance_m - run.counted_m
+        told = _Range(time_s, low_m - run.slack_m, high_m + run.slack_m, counter_m)
+        low_m, high_m = low_m + run.least_m, high_m + run.most_m
+        if sure:
+            self._believe(_Interval(low_m, high_m), told)
+            return True
+        self._compare(told)
+        known = self._known
+        if known is not None and known.overlaps(low_m, high_m):
+            known.take(low_m, high_m)
+            self._ranged = None
+            if uncertainty_m <= UNSEEN_M or self._agreed is None:
+                self._agreed = told
+            return True
+        self._collect(low_m, high_m, told)
         return True
+
+    def _believe(self, interval: _Interval, told: _Range) -> None:
+        self._known, self._ranged, self._agreed = interval, None, told
+
+    def _collect(self, low_m: float, high_m: float, told: _Range) -> None:
+        """Take a range that what is known, if anything is, contradicts."""
+        ranged = self._ranged
+        if ranged is not None and ranged.overlaps(low_m, high_m):
+            ranged.take(low_m, high_m)
+            ranged.ranges += 1
+        else:
+            ranged = self._ranged = _Interval(low_m, high_m, 1, told.time_s)
+        needed = self._needed(ranged)
+        if ranged.ranges >= needed.ranges and told.time_s - ranged.since_s >= needed.span_s - 1e-6:
+            self._believe(ranged, told)
+
+    def _needed(self, ranged: _Interval) -> Confirmation:
+        """How many ranges in a row are believed against what is known."""
+        known, agreed = self._known, self._agreed
+        if known is None:
+            return LOCATING
+        if agreed is None or self._doubt_s >= agreed.time_s:
+            return DOUBTED
+        unseen_m = UNSEEN_M + UNSEEN_PART * (self._readings[-1].distance_m - agreed.counter_m)
+        near = known.overlaps(ranged.low_m - unseen_m, ranged.high_m + unseen_m)
+        return DRIFTED if near else MISPLACED
+
+    def _compare(self, told: _Range) -> None:
+        """Compare the way between two ranges with what the wheels counted."""
+        since = self._compared
+        if since is None or told.time_s < since.time_s:
+            if since is None:
+                self._compared = told
+            return
+        counted_m = told.counter_m - since.counter_m
+        most_m, least_m = told.high_m - since.low_m, told.low_m - since.high_m
+        slack_m = self._error * abs(counted_m)
+        if not least_m - slack_m <= counted_m <= most_m + slack_m:
+            self._watch.suspect()
+            self._doubt_s = self._readings[-1].time_s
+            self._compared = told
+        elif told.time_s - since.time_s >= WINDOW_S:
+            self._watch.trust()
+            self._compared = told
 
     def location(self, time_s: float) -> Location:
         """Place of the front at a time from the history up to the latest reading.
 
         Later than that nothing is known any more: an odometer that has fallen silent is a fault.
         """
-        counted = self._run_since(time_s)
-        if counted is None or self._high_m == inf:
+        run, known = self._run_since(time_s), self._known
+        if run is None or known is None:
             return NOWHERE
-        run_m, slack_m = counted
+        low_m, high_m = known.low_m, known.high_m
+        if self._ranged is not None:
+            low_m, high_m = min(low_m, self._ranged.low_m), max(high_m, self._ranged.high_m)
         # Backwards the front is the further away the more the train has truly run.
-        low_m = self._low_m - (1.0 + self._error) * run_m - slack_m
-        high_m = self._high_m - (1.0 - self._error) * run_m + slack_m
+        low_m, high_m = low_m - run.most_m, high_m - run.least_m
         middle_m = low_m + 0.5 * (high_m - low_m)
         return Location(self._direction * middle_m, 0.5 * (high_m - low_m), True)
 
-    def _run_since(self, time_s: float) -> tuple[float, float] | None:
-        """Distance counted since a time, and how far it may be off [m]; None if not known."""
+    def _run_since(self, time_s: float) -> _Run | None:
+        """Way run since a time; None if not known."""
         readings = self._readings
         if not readings or not readings[0].time_s <= time_s <= readings[-1].time_s:
             return None
@@ -218,10 +407,19 @@ class TrainLocation:
         at = bisect_right(readings, time_s, key=lambda reading: reading.time_s) - 1
         before = readings[at]
         if before.time_s == time_s:
-            return last.distance_m - before.distance_m, 0.0
-        after = readings[at + 1]
-        tick_s = after.time_s - before.time_s
-        part = (time_s - before.time_s) / tick_s
-        distance_m = before.distance_m + part * (after.distance_m - before.distance_m)
-        slack_m = part * (1.0 - part) * abs(after.speed_mps - before.speed_mps) * tick_s
-        return last.distance_m - distance_m, slack_m
+            part, slack_m, after = 0.0, 0.0, before
+        else:
+            after = readings[at + 1]
+            tick_s = after.time_s - before.time_s
+            part = (time_s - before.time_s) / tick_s
+            slack_m = part * (1.0 - part) * abs(after.speed_mps - before.speed_mps) * tick_s
+
+        def since(last_m: float, before_m: float, after_m: float) -> float:
+            return last_m - before_m - part * (after_m - before_m)
+
+        return _Run(
+            since(last.distance_m, before.distance_m, after.distance_m),
+            since(last.least_m, before.least_m, after.least_m) - slack_m,
+            since(last.most_m, before.most_m, after.most_m) + slack_m,
+            slack_m,
+        )

@@ -14,8 +14,9 @@ from rail_msgs_py.train_radio.train_channel import CountedChannel
 from rail_msgs_py.train_radio.train_report import FASTEST_MPS, WIDEST_M, LocationReport
 from rail_onboard.track_code.supervision import SupervisionOutput
 
-from .supervision import AuthoritySupervision, ReceivedAuthority
+from .supervision import ReceivedAuthority
 from .train_location import NOWHERE, Location, TrainLocation
+from .train_modes import ModeSupervision, TrainMode
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,21 @@ class TrainIdentity:
     direction: int = 1
 
 
+@dataclass(frozen=True)
+class LocalizerView:
+    """What a localizer says: where the front is, the speed that it believes, and the fastest."""
+
+    location: Location
+    believed_mps: float
+    fastest_mps: float
+
+
 class TrainProtection:
     """Takes frames and the odometer, gives the train's own frame and what it may do.
 
     Where the front is it works out itself, from what it is told and from the odometer, or takes
-    from a localizer.
+    from a localizer as long as that knows. What it was told when it was put into service counts
+    only if it is on from the start of the run, stamp 0: switched on later it has to be located.
 
     Parameters
     ----------
@@ -46,7 +57,7 @@ class TrainProtection:
     channel : SafeChannel
         To the zone controller.
     location : TrainLocation
-    supervision : AuthoritySupervision
+    supervision : ModeSupervision
     """
 
     def __init__(
@@ -54,14 +65,19 @@ class TrainProtection:
         identity: TrainIdentity,
         channel: SafeChannel,
         location: TrainLocation,
-        supervision: AuthoritySupervision,
+        supervision: ModeSupervision,
     ) -> None:
         self._identity, self._channel = identity, CountedChannel(channel)
         self._location, self._supervision = location, supervision
-        self._placed = False
-        self._here = NOWHERE
+        self._begun = self._braked = False
+        self._here, self._fastest_mps = NOWHERE, 0.0
         #: Ranged positions told in the tick: when sealed [s], position, half-width [m].
         self.relayed: list[tuple[float, float, float]] = []
+
+    @property
+    def mode(self) -> TrainMode:
+        """Mode of the train."""
+        return self._supervision.mode
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -74,35 +90,47 @@ class TrainProtection:
         distance_m: float,
         speed_mps: float,
         frames: Iterable[bytes],
-        located: Location | None = None,
-        fastest_mps: float | None = None,
+        localizer: LocalizerView | None = None,
     ) -> SupervisionOutput:
-        """One tick: odometer and frames received in it, and what a localizer says.
+        """One tick.
 
         Parameters
         ----------
         time_ns : int
         distance_m, speed_mps : float
-            Of the odometer; with a localizer the speed that it believes.
+            Of the odometer.
         frames : iterable of bytes
-        located, fastest_mps : optional
-            Where a localizer says the front is, and the fastest that the train may run.
+            Received in the tick.
+        localizer : LocalizerView, optional
+            What a localizer says, if it knows where the train is.
         """
         time_s = time_ns / NANOSECONDS
         self.relayed = []
-        self._location.update(time_s, distance_m, speed_mps)
-        if not self._placed:
-            train = self._identity
-            self._placed = self._location.fix(time_s, train.start_m, train.placed_m)
+        self._location.update(time_s, distance_m, speed_mps, braked=self._braked)
+        if not self._begun:
+            self._begun, train = True, self._identity
+            if time_ns == 0:
+                self._location.place(time_s, train.start_m, train.placed_m)
         newest: ReceivedAuthority | None = None
         for frame in frames:
             authority = self._read(frame, time_ns)
             if authority is not None and (newest is None or authority.sealed_s > newest.sealed_s):
                 newest = authority
-        self._here = self._location.location(time_s) if located is None else located
-        return self._supervision.update(
-            time_s, self._here, speed_mps, authority=newest, fastest_mps=fastest_mps
+        doubted = localizer is None and self._location.odometer_doubted
+        if localizer is None:
+            own_mps = self._location.fastest_mps if doubted else abs(speed_mps)
+            localizer = LocalizerView(self._location.location(time_s), speed_mps, own_mps)
+        self._here, self._fastest_mps = localizer.location, localizer.fastest_mps
+        out = self._supervision.update(
+            time_s,
+            localizer.location,
+            localizer.believed_mps,
+            authority=newest,
+            fastest_mps=localizer.fastest_mps,
+            odometer_doubted=doubted,
         )
+        self._braked = out.service_brake or out.emergency_brake
+        return out
 
     def _read(self, frame: bytes, time_ns: int) -> ReceivedAuthority | None:
         _, opened = self._channel.open(frame, time_ns)
@@ -131,7 +159,7 @@ class TrainProtection:
             telegram.emergency_stop,
         )
 
-    def frame(self, time_ns: int, speed_mps: float) -> bytes:
+    def frame(self, time_ns: int) -> bytes:
         """The train's own frame, which tells where it is in this tick."""
         train, here = self._identity, self._here
         valid = here.valid and here.uncertainty_m <= WIDEST_M
@@ -140,7 +168,7 @@ class TrainProtection:
             train.segment,
             here.position_m if valid else 0.0,
             train.direction,
-            min(abs(speed_mps), FASTEST_MPS),
+            min(self._fastest_mps, FASTEST_MPS),
             here.uncertainty_m if valid else WIDEST_M,
             train.length_m,
             True,
@@ -158,4 +186,6 @@ class TrainProtection:
             here.uncertainty_m if here.valid else inf,
             nan if held is None else held.end_m,
             inf if held is None else time_s - held.sealed_s,
+            float(self.mode),
+            float(self._location.odometer_doubted),
         )

@@ -16,6 +16,10 @@ class DriveCommand:
         Speed not to exceed; above it the full service brake is applied.
     service_brake, emergency_brake : bool
         Demands of full braking; the emergency brake goes before.
+    traction_cut_off : bool
+        The motors get no current.
+    on_sight : bool
+        The driver goes no faster than lets him stop short of whatever he sees.
 
     Raises
     ------
@@ -26,6 +30,8 @@ class DriveCommand:
     max_speed_mps: float = inf
     service_brake: bool = False
     emergency_brake: bool = False
+    traction_cut_off: bool = False
+    on_sight: bool = False
 
     def __post_init__(self) -> None:
         if isnan(self.max_speed_mps) or self.max_speed_mps < 0.0:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any, Final
 
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext
+from rail_corridor.scenario.actions import ReleaseOnSight
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.quantities import CLAIM_SIGMAS
+from rail_msgs_py.train_radio.quantities import ON_SIGHT
 from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.train_radio.burst import RadioBurstFormat
@@ -25,6 +28,10 @@ from .world import threats_of
 CBTC_MEDIUM: Final = "/world/cbtc_medium"
 #: How far authorities reach past the end of a track whose trains go on.
 _BEYOND_M: Final = 2000.0
+#: No vehicle exceeds its highest speed by more.
+_OVERSPEED_MPS: Final = 3.0
+#: Resistance of the sharpest curve of the line model, force over weight.
+_STEEPEST_CURVE: Final = 0.008
 
 
 def cbtc_nodes(scenario: Scenario, context: PlanContext) -> list[NodeSpec]:
@@ -110,6 +117,8 @@ def _on_board(plan: CbtcPlan, number: int, timeout_s: float) -> dict[str, Any]:
 def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> dict[str, Any]:
     train = scenario.trains[number - 1]
     track = scenario.network.tracks[train.route[0]]
+    vehicle = Vehicle(train.vehicle)
+    releases = releases_of(scenario, train.name)
     return {
         "number": number,
         "segment": list(scenario.network.tracks).index(train.route[0]),
@@ -118,7 +127,11 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
         "steepest_fall_permil": steepest_fall_permil(track),
         "braking_mps2": plan.braking_mps2,
         "emergency_mps2": plan.emergency_mps2,
-        "traction_mps2": Vehicle(train.vehicle).traction_mps2(0.0),
+        "traction_mps2": vehicle.traction_mps2(0.0),
+        "most_braking_mps2": most_braking_mps2(vehicle, track),
+        "fastest_mps": vehicle.max_speed_mps + _OVERSPEED_MPS,
+        "releases_s": tuple(each.at_s for each in releases),
+        "on_sight_mps": on_sight_mps(releases),
         "odometer_error": CLAIM_SIGMAS.default * plan.odometer_error,
         "authority_timeout_s": plan.timeout_s,
         "secret": authentication_key(scenario),
@@ -132,6 +145,26 @@ def steepest_fall_permil(track: Track) -> float:
     """Steepest fall towards increasing chainage, 0 or more [permil]."""
     steps = track.gradients_permil.part(0.0, track.length_m)
     return max(0.0, *(-gradient for _, gradient in steps))
+
+
+def most_braking_mps2(vehicle: Vehicle, track: Track) -> float:
+    """Most that a train can slow down by on a track [m/s^2]: brakes, resistance and rise."""
+    steps = track.gradients_permil.part(0.0, track.length_m)
+    rise_permil = max(0.0, *(gradient for _, gradient in steps))
+    resistance_mps2 = vehicle.running_resistance_mps2(vehicle.max_speed_mps)
+    curves_mps2 = vehicle.gravity_mps2 * _STEEPEST_CURVE
+    climb_mps2 = vehicle.gravity_mps2 * 1e-3 * rise_permil
+    return vehicle.emergency_brake_mps2 + resistance_mps2 + curves_mps2 + climb_mps2
+
+
+def releases_of(scenario: Scenario, train: str) -> list[ReleaseOnSight]:
+    """When a train is released to run on sight."""
+    return [action for action in scenario.actions if action.train == train]
+
+
+def on_sight_mps(releases: Iterable[ReleaseOnSight]) -> float:
+    """Speed of a train on sight: the least that its releases say."""
+    return min((each.speed_kmh / 3.6 for each in releases), default=ON_SIGHT.default)
 
 
 def controller_parameters(scenario: Scenario) -> dict[str, Any]:
@@ -160,6 +193,11 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
         "leaves_at_m": tuple(
             tracks[train.route[0]].length_m if train.leaves_on_arrival else 0.0
             for train in by_departure
+        ),
+        "released_trains": tuple(numbers[each.train] for each in scenario.actions),
+        "released_at_s": tuple(each.at_s for each in scenario.actions),
+        "released_mps": tuple(
+            on_sight_mps(releases_of(scenario, each.train)) for each in scenario.actions
         ),
         "margin_m": plan.margin_m,
         "validity_s": plan.timeout_s,

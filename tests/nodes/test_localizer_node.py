@@ -196,6 +196,8 @@ def test_the_node_says_what_the_localizer_says(graph: Any) -> None:
             "speed_low_mps": here.speed_low_mps,
             "speed_high_mps": here.speed_high_mps,
             "sigma_m": here.sigma_m,
+            "fastest_mps": here.fastest_mps,
+            "wheels_doubted": here.wheels_doubted,
         }
     assert here.status is Status.PROTECTED
     assert (train.position.chainage_m, train.position.speed_mps) == (

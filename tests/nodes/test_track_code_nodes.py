@@ -203,7 +203,7 @@ def test_supervision_judges_the_fastest_that_a_localizer_allows(graph: Any) -> N
     def tick(number: int, believed_mps: float, fastest_mps: float) -> dict[str, float]:
         place = dict.fromkeys(LOCALIZER_STATE.columns, 0.0)
         place |= {"low_m": -1.0, "high_m": 1.0, "speed_mps": believed_mps}
-        place |= {"speed_low_mps": -0.1, "speed_high_mps": fastest_mps}
+        place |= {"fastest_mps": fastest_mps, "wheels_doubted": 1.0}
         code(codes.write(number * TICK_NS, heard))
         odometer(wheels.write(number * TICK_NS, np.array([[0.0, 0.0]])))  # they stand still
         row = np.array([[place[name] for name in LOCALIZER_STATE.columns]])

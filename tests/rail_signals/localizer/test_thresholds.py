@@ -147,11 +147,12 @@ def test_the_widest_level_that_is_given(factor: float, status: Status) -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "status"), [(NEAR, Status.PROTECTED), (FAR, Status.UNAVAILABLE)]
+    ("factor", "status"), [(NEAR, Status.PROTECTED), (FAR, Status.UNMONITORED)]
 )
 def test_the_widest_hull_of_intervals_that_are_each_narrow_enough(
     factor: float, status: Status
 ) -> None:
+    """Beyond it the position is that of all sensors, and says whose fault it does not survive."""
     sigma_m = 35.0
     bank = bank_of(10.0, fewer_m=40.0)
     bank.variances[S, 1 + Sensor.RANGE] = sigma_m**2
@@ -159,6 +160,9 @@ def test_the_widest_hull_of_intervals_that_are_each_narrow_enough(
     here = estimate_of(bank)
     assert not here.detected
     assert here.status == status
+    assert here.uncovered[Sensor.RANGE] == (status is Status.UNMONITORED)
+    if status is Status.UNMONITORED:
+        assert here.protection_m <= 40.0 * SIGMAS_OF_THE_LEVEL
 
 
 @pytest.mark.parametrize("factor", [NEAR, FAR])

@@ -49,7 +49,7 @@ LOCALIZER_STATE: Final = Topic(
     ESTIMATE,
     Table,
     "localizer",
-    "atp, code_supervision, people, the report",
+    "atp, code_supervision, doppler_positioner, people, the report",
     "Front of the train from all sensors, its protection level, and which sensors are excluded.",
     table=(
         Column(
@@ -80,6 +80,14 @@ LOCALIZER_STATE: Final = Topic(
         Column(
             "sigma_m",
             "standard deviation of the front if no sensor is faulty, infinite if unavailable",
+        ),
+        Column(
+            "fastest_mps",
+            "greatest speed of either direction, unless wheels deceive that have not been found "
+            "out yet, infinite if unavailable",
+        ),
+        Column(
+            "wheels_doubted", "1 if the wheels slip, slide, send nothing, or may be faulty, else 0"
         ),
     ),
     awaited=True,

@@ -1,26 +1,30 @@
 """Positions of a train from the Doppler shifts of reference stations.
 
-Topics in: ``rx``. Topics out: ``fix``, ``position``.
+Topics in: ``rx``, with a localizer its ``state`` of the tick before. Topics out: ``fix``,
+``position``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from rail_msgs_py.decoders import block
+from rail_msgs_py.decoders import block, table_row
 from rail_msgs_py.doppler import quantities
 from rail_msgs_py.doppler.parameters import ReferenceToneParameters, tone_plan_of
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.quantities import DIRECTION_OR_UNKNOWN, TRAIN_START
+from rail_msgs_py.quantities import DIRECTION_OR_UNKNOWN, GIVE_UP, TICK, TRAIN_START
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.doppler import DOPPLER_FIX, DOPPLER_POSITION, REFERENCE_RX
+from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.waveform import Waveform
+from rail_onboard.localizer.protected_interval import protected_interval
 from rail_signals.doppler.receiver import ToneReceiver
 from rail_signals.doppler.solver import Answer, DopplerSolver, NoFixReason
 from rail_signals.doppler.surveyed_line import SurveyedLine
@@ -50,11 +54,15 @@ class DopplerPositionerParameters(ReferenceToneParameters):
     worst_sigma_m: float = parameter(
         50.0, "a position more uncertain than this is not given", unit="m", low=0.01, high=1e4
     )
-    localizer: bool = parameter(False, "whether a localizer waits for the positions")
+    localizer: bool = parameter(
+        False, "whether a localizer waits for the positions, and tells where to look"
+    )
+    tick_s: float = TICK.parameter()
+    timeout_s: float = GIVE_UP.parameter()
 
 
-def positioner_of(p: DopplerPositionerParameters) -> DopplerPositioner:
-    """Positioner of the parameters.
+def positioner_of(p: DopplerPositionerParameters, *, restarted: bool = False) -> DopplerPositioner:
+    """Positioner of the parameters; one that has restarted does not know where the train is.
 
     Raises
     ------
@@ -78,7 +86,8 @@ def positioner_of(p: DopplerPositionerParameters) -> DopplerPositioner:
         grid_m=min(5.0, 0.25 * p.min_distance_m),
     )
     tracking = Tracking(p.max_speed_mps, p.placed_m, p.walk_hz, p.station_hz)
-    return DopplerPositioner(ToneReceiver(plan), solver, tracking, p.start_m, p.direction)
+    start_m = None if restarted else p.start_m
+    return DopplerPositioner(ToneReceiver(plan), solver, tracking, start_m, p.direction)
 
 
 class DopplerPositionerNode(
@@ -94,20 +103,32 @@ class DopplerPositionerNode(
         self._fix = self.table_out(DOPPLER_FIX, (train,), awaited=p.localizer, train=train)
         self._position = self.publisher(DOPPLER_POSITION, train=train).send
         self._writer = PositionWriter(train, p.track)
-        self.blocks_in(REFERENCE_RX, block, self._on_block, train=train)
+        self._received = self.inputs.trigger(REFERENCE_RX, block, train=train)
+        self._localizer = ""
+        if p.localizer:
+            # It answers to the positions of a tick, so what it says is of use in the next.
+            late_ns, row = round(p.tick_s * NANOSECONDS), table_row(LOCALIZER_STATE)
+            self._localizer = self.inputs.port(LOCALIZER_STATE, row, delay_ns=late_ns, train=train)
 
     def start_over(self) -> None:
-        """Be where the train is put into service."""
-        self._positioner = positioner_of(self._p)
+        """Know no place; see `on_tick`."""
+        self._positioner = positioner_of(self._p, restarted=True)
         self._last_ns: int | None = None
 
-    def _on_block(self, stamp_ns: int, received: Waveform | None) -> None:
-        self.at_tick(stamp_ns)
+    def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
+        """Find the place by what was received in a tick."""
+        received: Waveform | None = items.get(self._received)
+        if self._last_ns is None and stamp_ns == 0:
+            # Where the train is put into service is known at the start of the run, and to no one
+            # who is switched on later.
+            self._positioner = positioner_of(self._p)
         step_s = 0.0 if self._last_ns is None else (stamp_ns - self._last_ns) / NANOSECONDS
         self._last_ns = stamp_ns
         positioner = self._positioner
         answer = Answer(NoFixReason.TOO_FEW_STATIONS)
         if self.switched_on:
+            if (known := protected_interval(items.get(self._localizer))) is not None:
+                positioner.tell(known.low_m, known.high_m)
             answer = positioner.locate(None if received is None else received.row, step_s)
         self._publish(stamp_ns, answer, positioner.tones)
 

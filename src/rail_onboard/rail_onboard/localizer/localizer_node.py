@@ -116,7 +116,6 @@ class LocalizerNode(EquipmentNode[LocalizerParameters], name="localizer", namesp
         p, train = self._p, self.place
         self._localizer = Localizer(settings_of(p))
         self._entries = BlockEntries(p.joints_m, p.joint_carriers_hz)
-        self._in_service = False
         self._odometer = self.inputs.trigger(ODOMETER, table_row(ODOMETER), train=train)
         self._doppler = self._relayed = self._ranged = self._codes = ""
         if p.doppler:
@@ -130,8 +129,8 @@ class LocalizerNode(EquipmentNode[LocalizerParameters], name="localizer", namesp
             self._ranged = self.inputs.port(POSITION, self._on_own_track, train=train)
         if p.joints_m:
             self._codes = self.inputs.port(CODE_RECEIVED, table_row(CODE_RECEIVED), train=train)
-        # Train protection or code supervision waits for it.
-        awaited = p.told or bool(p.joints_m)
+        # Train protection, code supervision or the positioner waits for it.
+        awaited = p.told or bool(p.joints_m) or p.doppler
         self._state = self.table_out(LOCALIZER_STATE, (train,), awaited=awaited, train=train)
         self._position = self.publisher(LOCALIZER_POSITION, train=train).send
         self._writer = PositionWriter(train, p.track)
@@ -141,6 +140,7 @@ class LocalizerNode(EquipmentNode[LocalizerParameters], name="localizer", namesp
         self._localizer.reset()
         self._entries.reset()
         self._believed_m = nan
+        self._started = False
 
     def _on_own_track(self, raw: bytes) -> tuple[int, tuple[float, float, float, float] | None]:
         stamp_ns, track, values = position_from_cdr(raw)
@@ -148,8 +148,10 @@ class LocalizerNode(EquipmentNode[LocalizerParameters], name="localizer", namesp
 
     def on_tick(self, stamp_ns: int, items: Mapping[str, Any]) -> None:
         """Locate the train by what its sensors say in a tick."""
-        # The place where it is put into service is that of the first tick and of no later one.
-        starting, self._in_service = not self._in_service, True
+        # The place where it is put into service is known at the start of the run, and to no one
+        # who is switched on later.
+        starting = not self._started and stamp_ns == 0
+        self._started = True
         columns: tuple[float, ...] = _UNKNOWN
         trouble = "switched off"
         if self.switched_on:
@@ -234,7 +236,7 @@ def _odometer_of(row: list[float] | None) -> WheelSpeed | None:
 
 
 #: Of what is published where nothing is known, as `LOCALIZER_STATE.columns`.
-_UNKNOWN: Final = (0.0, 0.0, 0.0, 0.0, nan, -inf, inf, nan, -inf, inf, inf)
+_UNKNOWN: Final = (0.0, 0.0, 0.0, 0.0, nan, -inf, inf, nan, -inf, inf, inf, inf, 0.0)
 
 
 def _columns(here: Localization) -> tuple[float, ...]:
@@ -251,6 +253,8 @@ def _columns(here: Localization) -> tuple[float, ...]:
         here.speed_low_mps,
         here.speed_high_mps,
         here.sigma_m,
+        here.fastest_mps,
+        float(here.wheels_doubted),
     )
 
 

@@ -78,8 +78,8 @@ class CodeSupervisionNode(
         known = protected_interval(items.get(self._localizer))
         if known is not None:
             travelled_m = known.travelled(self._p.direction)
-            speed_mps = known.believed_mps
-            fastest_mps, doubt_mps = known.fastest_mps, known.doubt_mps
+            speed_mps, fastest_mps = known.speeds(speed_mps)
+            doubt_mps = fastest_mps - speed_mps
         output = self._supervision.update(
             stamp_ns * 1e-9,
             distance_m,

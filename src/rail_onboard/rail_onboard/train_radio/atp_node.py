@@ -34,6 +34,7 @@ from rail_msgs_py.train_radio.train_channel import train_end
 from rail_onboard.braking_curve import GuaranteedBraking
 from rail_onboard.localizer.protected_interval import protected_interval
 from rail_onboard.track_code.supervision import SupervisionOutput, Thresholds
+from rail_signals.track_code.scales import deceleration_mps2 as deceleration_mps2_on
 
 from .odometer_watch import RunningLimits
 from .supervision import AuthoritySupervision
@@ -41,6 +42,8 @@ from .train_location import Location, TrainLocation
 from .train_modes import ModeSupervision, TrainMode
 from .train_protection import LocalizerView, TrainIdentity, TrainProtection
 
+#: In which a brake has built up its force, at the latest.
+_BUILD_UP_S = 1.0
 _NOT_RELAYED = (nan, nan, inf)
 _OFF = SupervisionOutput(0.0, True, True, True, "switched off")
 _MODES = {
@@ -144,6 +147,17 @@ def protection_of(p: AtpParameters, restarts: int = 0) -> TrainProtection:
     return TrainProtection(identity, channel, location, modes)
 
 
+def _worst_brake(p: AtpParameters) -> tuple[float, float]:
+    """Deceleration on the steepest fall, and the delay that the traction until then makes longer.
+
+    With D(v) = v T + (v + a T)^2 / (2 b) an error of speed costs as much way as with a delay of
+    T (1 + a / b) and no traction.
+    """
+    deceleration_mps2 = deceleration_mps2_on(p.braking_mps2, -p.steepest_fall_permil)
+    delay_s = 2.0 * p.tick_s + _BUILD_UP_S
+    return deceleration_mps2, delay_s * (1.0 + p.traction_mps2 / deceleration_mps2)
+
+
 class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
     """Train protection as a managed node; switched off it demands the emergency brake."""
 
@@ -179,9 +193,13 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
         localizer, doubt_mps = None, 0.0
         known = protected_interval(items.get(self._localizer)) if self._p.localizer else None
         if known is not None:
-            place = Location(known.low_m + known.half_m, known.half_m, True)
-            localizer = LocalizerView(place, known.believed_mps, known.fastest_mps)
-            doubt_mps = known.doubt_mps
+            believed_mps, fastest_mps = known.speeds(speed_mps)
+            doubt_mps = fastest_mps - believed_mps
+            # What it may be faster than supervised counts as way ahead of the front.
+            ahead_m = known.braking_m(fastest_mps, *_worst_brake(self._p))
+            half_m = known.half_m + 0.5 * ahead_m
+            place = Location(known.low_m + half_m, half_m, True)
+            localizer = LocalizerView(place, believed_mps, fastest_mps)
         out, sent = _OFF, []
         if self.switched_on:
             out = protection.tick(stamp_ns, distance_m, speed_mps, frames, localizer)

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import pairwise
 from math import inf, sqrt
 
 import numpy as np
@@ -158,11 +159,27 @@ class DopplerSolver:
         feet = np.argmin(np.abs(line.distances(self.stations_m, self._grid_m)), axis=0)
         #: Chainage beside which each station stands [m].
         self.feet_m: FloatArray = self._grid_m[feet]
+        alike = [np.sort(self.feet_m[self.slots == slot]) for slot in np.unique(self.slots)]
+        #: Least distance between two stations that share a tone, infinite if none do [m].
+        self.cycle_m = min((float(np.diff(f).min()) for f in alike if f.size > 1), default=inf)
 
     def stations_of(self, slots: ArrayLike, near_m: float) -> NDArray[np.int64]:
         """Station of each slot that stands nearest to a chainage; -1 where there is none."""
         asked = np.atleast_1d(np.asarray(slots, dtype=np.int64))
         return nearest_stations(asked, self.slots, self.feet_m, float(near_m))
+
+    def stretches(
+        self, slots: ArrayLike, window_m: tuple[float, float]
+    ) -> list[tuple[float, float]]:
+        """Parts of a window on the line, in each of which `stations_of` is the same throughout."""
+        low_m, high_m = max(self.line.start_m, window_m[0]), min(self.line.end_m, window_m[1])
+        edges = {low_m, high_m}
+        for slot in np.unique(np.asarray(slots, dtype=np.int64)):
+            alike_m = np.sort(self.feet_m[self.slots == slot])
+            middles_m = 0.5 * (alike_m[1:] + alike_m[:-1])
+            edges.update(middles_m[(middles_m > low_m) & (middles_m < high_m)].tolist())
+        ends_m = sorted(edges)
+        return list(pairwise(ends_m))
 
     def solve(
         self,

@@ -140,7 +140,7 @@ class Localizer:
         self._take(readings)
         self.bank.lose()
         self.monitor.test(self.bank, step_s)
-        return self._levels.estimate(self.bank, self.monitor, step_s)
+        return self._levels.estimate(self.bank, self.monitor, step_s, self._wheels.most_mps[..., 0])
 
     def _take(self, readings: TickMeasurements) -> None:
         model = self._model

@@ -10,11 +10,13 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .filter_bank import BoolArray, FilterBank, FloatArray, S, V
+from .filter_bank import BoolArray, FilterBank, FloatArray, S, V, Values
 from .integrity_monitor import HYPOTHESES, IntegrityMonitor
 from .settings import SENSORS, IntegrityClaim, Sensor
 
 IntArray: TypeAlias = NDArray[np.int64]
+#: Of the hypothesis that the wheels are faulty.
+_WHEELS: Final = 1 + Sensor.ODOMETER.value
 _NO_SENSOR: Final[frozenset[Sensor]] = frozenset()
 
 
@@ -55,12 +57,17 @@ class Estimate(NamedTuple):
         Chainage and the interval that holds it; NaN and infinite where not available.
     speed_mps, speed_low_mps, speed_high_mps : float64
         The same of the speed, positive with chainage.
+    fastest_mps : float64
+        Greatest speed of either direction, unless wheels deceive that have not been found out
+        yet; see `ProtectionLevels`.
     sigma_m : float64
         Standard deviation of the position if no sensor is faulty.
     status, reason : int64
         As `Status` and `ProtectionReason`.
     detected : bool
         Whether a sensor is known to be faulty.
+    wheels_doubted : bool
+        Whether that may be the wheels, or they slip, slide, or send nothing.
     excluded : bool [..., sensor]
         Sensors that are left out.
     uncovered : bool [..., sensor]
@@ -73,10 +80,12 @@ class Estimate(NamedTuple):
     speed_mps: FloatArray
     speed_low_mps: FloatArray
     speed_high_mps: FloatArray
+    fastest_mps: FloatArray
     sigma_m: FloatArray
     status: IntArray
     reason: IntArray
     detected: BoolArray
+    wheels_doubted: BoolArray
     excluded: BoolArray
     uncovered: BoolArray
 
@@ -97,6 +106,8 @@ class Localization:
         Chainage and the interval that holds it; NaN and infinite if not available.
     speed_mps, speed_low_mps, speed_high_mps : float
         The same of the speed, positive with chainage.
+    fastest_mps : float
+        As of `Estimate`.
     sigma_m : float
         Standard deviation of the position if no sensor is faulty.
     status : Status
@@ -104,6 +115,8 @@ class Localization:
         Why the status is no better.
     detected : bool
         Whether a sensor is known to be faulty.
+    wheels_doubted : bool
+        As of `Estimate`.
     excluded, uncovered : frozenset of Sensor
         Sensors left out, and those whose fault the interval does not survive.
     """
@@ -114,10 +127,12 @@ class Localization:
     speed_mps: float
     speed_low_mps: float
     speed_high_mps: float
+    fastest_mps: float
     sigma_m: float
     status: Status
     reason: ProtectionReason
     detected: bool
+    wheels_doubted: bool
     excluded: frozenset[Sensor]
     uncovered: frozenset[Sensor]
 
@@ -131,10 +146,12 @@ class Localization:
             float(estimate.speed_mps),
             float(estimate.speed_low_mps),
             float(estimate.speed_high_mps),
+            float(estimate.fastest_mps),
             float(estimate.sigma_m),
             Status(int(estimate.status)),
             ProtectionReason(int(estimate.reason)),
             bool(estimate.detected),
+            bool(estimate.wheels_doubted),
             _sensors(estimate.excluded.tolist()),
             _sensors(estimate.uncovered.tolist()),
         )
@@ -155,6 +172,19 @@ def _sensors(flags: list[bool]) -> frozenset[Sensor]:
 class ProtectionLevels:
     """Turns the possible hypotheses into an interval.
 
+    **A hypothesis that makes the interval too wide is no help.** Without sensor i the train may be
+    known so badly that the hull is wider than any that is given, as after a long way on wheels
+    that spun. The others hold it nevertheless, unless i is faulty: i is then uncovered, as where
+    the filter without it is lost.
+
+    **The fastest speed.** Without the wheels a speed is that of ranges, and some metres per second
+    uncertain at a stand as well. Nothing else that a train has can tell whether wheels have begun
+    to deceive a second ago, and supervision that reckoned with it at all times would let no train
+    move. The fastest speed is therefore that of the wheels and of their creep under full effort,
+    until they are *doubted*: they slip or slide, send nothing, or a fault has been found that may
+    be theirs. From then on it is that of the hull. The position rests on no such trust: while
+    wheels deceive unseen the train stays within its interval.
+
     Parameters
     ----------
     claim : IntegrityClaim
@@ -167,12 +197,29 @@ class ProtectionLevels:
         self._unmonitored_s = np.zeros(shape)
         none, all_well = np.zeros((*shape, SENSORS), np.bool_), np.zeros(shape, np.bool_)
         protected = np.full(shape, int(Status.PROTECTED))
-        self._all_well = (protected, np.zeros(shape, np.int64), all_well, none, none)
-        for array in self._all_well:
+        self._all_well = (protected, np.zeros(shape, np.int64), all_well)
+        self._none_out = (none, none)
+        for array in (*self._all_well, none):
             array.setflags(write=False)
 
-    def estimate(self, bank: FilterBank, monitor: IntegrityMonitor, step_s: float) -> Estimate:
-        """What may be claimed at the end of a tick."""
+    def estimate(
+        self,
+        bank: FilterBank,
+        monitor: IntegrityMonitor,
+        step_s: float,
+        wheels_mps: Values = np.inf,
+    ) -> Estimate:
+        """What may be claimed at the end of a tick.
+
+        Parameters
+        ----------
+        bank : FilterBank
+        monitor : IntegrityMonitor
+        step_s : float
+            Since the tick before.
+        wheels_mps : float or float64 [...]
+            Fastest speed by the wheels, as of `SlipDetector`; infinite where they do not tell.
+        """
         at = bank.x[: V + 1, ..., :HYPOTHESES]
         sigma = np.sqrt(bank.variances[: V + 1, ..., :HYPOTHESES])
         half = self._sigmas * sigma
@@ -183,15 +230,22 @@ class ProtectionLevels:
             # So narrow that each of the intervals is, and the hull about any middle.
             if (highest[S] - lowest[S]).max() <= self._claim.widest_m:
                 self._unmonitored_s.fill(0.0)
-                return _estimate(middle, lowest, highest, sigma_m, *self._all_well)
+                doubted = np.isinf(wheels_mps)
+                fastest = np.where(doubted, _fastest(lowest[V], highest[V]), wheels_mps)
+                well = (*self._all_well, doubted, *self._none_out)
+                return _estimate(middle, lowest, highest, fastest, sigma_m, *well)
 
         covered = bank.known[..., :HYPOTHESES] & (half[S] <= self._claim.widest_m)
         possible = monitor.refuted_s <= 0.0
         healthy = possible[..., 0]
+        reach = np.maximum(high[S] - middle[S][..., None], middle[S][..., None] - low[S])
+        covered &= ~((healthy & covered[..., 0])[..., None] & (reach > self._claim.widest_m))
         excluded = monitor.excluded.sum(axis=-1)
         # One sensor is faulty at most: once it is excluded, none of the others is.
         considered = possible & ((excluded == 0)[..., None] | (np.arange(HYPOTHESES) == 0))
         hull = considered & covered
+        doubted = monitor.excluded[..., Sensor.ODOMETER] | (~healthy & considered[..., _WHEELS])
+        doubted |= np.isinf(wheels_mps)
         low = np.where(hull, low, np.inf).min(axis=-1)
         high = np.where(hull, high, -np.inf).max(axis=-1)
         with np.errstate(invalid="ignore"):
@@ -223,25 +277,33 @@ class ProtectionLevels:
         gone = status == Status.UNAVAILABLE
         low, high = np.where(gone, -np.inf, low), np.where(gone, np.inf, high)
         middle, sigma_m = np.where(gone, np.nan, middle), np.where(gone, np.inf, sigma_m)
+        fastest = np.where(doubted, _fastest(low[V], high[V]), wheels_mps)
+        fastest = np.where(gone, np.inf, fastest)
         detected = ~healthy | (excluded > 0)
         excluded_now = monitor.excluded.copy()
-        return _estimate(
-            middle, low, high, sigma_m, status, reason, detected, excluded_now, uncovered
-        )
+        good_for = (status, reason, detected, doubted, excluded_now, uncovered)
+        return _estimate(middle, low, high, fastest, sigma_m, *good_for)
+
+
+def _fastest(low_mps: FloatArray, high_mps: FloatArray) -> FloatArray:
+    """Greatest speed of either direction."""
+    return np.maximum(high_mps, -low_mps)
 
 
 def _estimate(
     middle: FloatArray,
     low: FloatArray,
     high: FloatArray,
+    fastest: FloatArray,
     sigma_m: FloatArray,
     status: IntArray,
     reason: IntArray,
     detected: BoolArray,
+    doubted: BoolArray,
     excluded: BoolArray,
     uncovered: BoolArray,
 ) -> Estimate:
     return Estimate(
-        *(middle[S], low[S], high[S], middle[V], low[V], high[V]),
-        *(sigma_m, status, reason, detected, excluded, uncovered),
+        *(middle[S], low[S], high[S], middle[V], low[V], high[V], fastest),
+        *(sigma_m, status, reason, detected, doubted, excluded, uncovered),
     )

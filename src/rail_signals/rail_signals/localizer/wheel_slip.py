@@ -49,6 +49,12 @@ class SlipDetector:
         self._fastest_mps: FloatArray = np.zeros(self._shape)
         self.slip_mps: FloatArray = np.full(self._shape, self._model.creep_mps)
         """Sigma of the slip [..., 1]."""
+        self.most_mps: FloatArray = np.full(self._shape, np.inf)
+        """Speed that a train does not exceed whose wheels creep as much as under full effort.
+
+        Infinite [..., 1] while they slip or slide, and without a reading. Effort is always
+        reckoned with: it is with the brakes on that a speed read too low does harm.
+        """
         self.steady_mps: FloatArray = np.zeros(self._shape)
         """Speed of the wheels, of some time ago: it stands still while they keep theirs [..., 1].
 
@@ -63,6 +69,7 @@ class SlipDetector:
         model = self._model
         if reading is None:
             self._left_s -= step_s
+            self.most_mps = np.full(self._shape, np.inf)
             return
         wheel_mps = np.abs(reading.speed_mps)
         if reading.present is not True:
@@ -95,3 +102,6 @@ class SlipDetector:
             slip_mps = np.where(slip, slips_mps, np.where(effort, efforts_mps, slip_mps))
             self._busy = bool(effort.any() or slip.any())
         self.slip_mps = slip_mps
+        trusted = reading.present & (self._left_s[1] <= 0.0)
+        creep_mps = model.effort_creep * wheel_mps + model.effort_creep_mps
+        self.most_mps = np.where(trusted, wheel_mps + creep_mps, np.inf)

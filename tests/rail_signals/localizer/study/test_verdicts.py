@@ -70,10 +70,12 @@ def scripted(script: Script) -> type:
                 "speed_mps": v.copy(),
                 "speed_low_mps": v - HALF_MPS,
                 "speed_high_mps": v + HALF_MPS,
+                "fastest_mps": np.abs(v) + HALF_MPS,
                 "sigma_m": np.ones(RUNS),
                 "status": np.full(RUNS, int(Status.PROTECTED)),
                 "reason": np.full(RUNS, int(ProtectionReason.NONE)),
                 "detected": np.zeros(RUNS, np.bool_),
+                "wheels_doubted": np.zeros(RUNS, np.bool_),
                 "excluded": np.zeros((RUNS, SENSORS), np.bool_),
                 "uncovered": np.zeros((RUNS, SENSORS), np.bool_),
             }

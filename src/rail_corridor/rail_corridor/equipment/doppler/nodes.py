@@ -36,6 +36,7 @@ def doppler_nodes(scenario: Scenario, context: PlanContext) -> list[NodeSpec]:
         nodes.append(NodeSpec("reference_station", name, "wayside", parameters))
     for train in scenario.trains:
         parameters = tones | _line(scenario, train.route[0]) | _positioner(plan, train)
+        parameters |= {"tick_s": scenario.tick_s, "timeout_s": 5 * context.timeout_s / 10}
         parameters |= context.offers("doppler_positioner", scenario, train.name)
         nodes.append(
             NodeSpec("doppler_positioner", f"/{train.name}/doppler", "onboard", parameters)

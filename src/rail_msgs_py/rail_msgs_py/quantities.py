@@ -16,6 +16,10 @@ FAULT_END: Final = Quantity(1e6, "end", unit="s", low=0.0, high=1e6)
 SLIP_RATIO: Final = Quantity(
     NEEDED, "speed of the wheels over that of the train", low=0.0, high=3.0
 )
+BRAKE_FACTOR: Final = Quantity(1.0, "what is left of the force of a brake", low=0.0, high=1.0)
+ADHESION: Final = Quantity(
+    NEEDED, "adhesion of wheels on rails, 0.3 dry, 0.05 under leaves", low=0.01, high=0.6
+)
 
 TRAIN_START: Final = Quantity(
     0.0,

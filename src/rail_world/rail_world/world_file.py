@@ -13,7 +13,15 @@ from rail_world.line.description import JunctionDescription, TrackDescription
 from rail_world.line.description_base import range_of
 from rail_world.line.drawing import Drawing
 from rail_world.line.network import Network, build_network
-from rail_world.trains.description import TrainDescription, TrainStop, WheelSlip
+from rail_world.trains.conditions import Conditions
+from rail_world.trains.description import (
+    LowAdhesion,
+    ReducedBraking,
+    SpeedRestriction,
+    TrainDescription,
+    TrainStop,
+    WheelSlip,
+)
 
 Part = TypeVar("Part", bound=BaseModel)
 
@@ -37,6 +45,12 @@ class WorldFile(BaseModel):
     drawing: Drawing = Drawing()
     stops: tuple[TrainStop, ...] = ()
     slips: tuple[WheelSlip, ...] = ()
+    reduced_braking: tuple[ReducedBraking, ...] = ()
+    low_adhesion: tuple[LowAdhesion, ...] = ()
+    boards: tuple[SpeedRestriction, ...] = Field(
+        (), description="restrictions that drivers see; none where supervision tells them"
+    )
+    quiet_from_s: float = Field(0.0, description="when the last fault has ended, infinite = never")
     scenario: str = Field("", description="JSON, announced as it is on /world/scenario")
     odometer_error: Annotated[float, range_of(ODOMETER_ERROR)]
 
@@ -57,6 +71,11 @@ class WorldFile(BaseModel):
         if name not in self.parts:
             raise LookupError(f"describes no {name}")
         return kind.model_validate(self.parts[name])
+
+    @property
+    def conditions(self) -> Conditions:
+        """What befalls the trains."""
+        return Conditions(self.stops, self.reduced_braking, self.low_adhesion, self.boards)
 
     def network(self) -> Network:
         """The tracks, joined."""

@@ -14,7 +14,6 @@ from functools import partial
 from math import inf
 from typing import Any
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Header, String
 
@@ -48,8 +47,8 @@ from rail_msgs_py.topics.world import (
 )
 from rail_world.line.corridor_map import markers, path_of
 from rail_world.trains.drive_command import DriveCommand
+from rail_world.trains.odometers import Odometers
 from rail_world.trains.traffic import Traffic
-from rail_world.trains.wheels import Wheels, wheel_errors
 
 from .steps import Steps
 from .world_file import WorldFile, read_world_file
@@ -94,8 +93,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         network = described.network()
         self._tick_ns = described.tick_ns
         #: The trains as they are: for judging alone.
-        self.traffic = Traffic(described.trains, network, described.tick_s)
-        self._stops = described.stops
+        self.traffic = Traffic(described.trains, network, described.tick_s, described.conditions)
         self._tick = -1
         self._begun_s = self._started_s = self.steady_s()
         self._sign_s: float | None = None
@@ -122,11 +120,13 @@ class WorldNode(TickNode[WorldParameters], name="world"):
             train: self.table_out(ODOMETER, (train,), awaited=True, train=train)
             for train in self._p.odometers
         }
-        errors = wheel_errors(described.seed, described.odometer_error, self._p.odometers)
-        self._wheels = {
-            train: Wheels(error, [slip for slip in described.slips if slip.train == train])
-            for train, error in errors.items()
-        }
+        self._counted = Odometers(
+            described.seed,
+            described.odometer_error,
+            self._p.odometers,
+            described.trains,
+            described.slips,
+        )
         # Until its first command a train stands: what is not received is not permitted.
         self._commands = dict.fromkeys(self._p.supervised, _NOT_RECEIVED)
         ports = (*self._p.sinks, *self._supervisors.values())
@@ -225,10 +225,9 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         return True
 
     def take_faults(self, world: WorldFile) -> None:
-        """Go on with other stops and slips, all else being as it was."""
-        self._stops = world.stops
-        for train, wheels in self._wheels.items():
-            wheels.slips = tuple(slip for slip in world.slips if slip.train == train)
+        """Go on with other faults of trains, all else being as it was."""
+        self.traffic.conditions = world.conditions
+        self._counted.slip(world.slips)
 
     @property
     def ticks(self) -> int:
@@ -255,7 +254,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
             return
         self._tick += 1
         if self._tick > 0:
-            self.traffic.step({**self._commands, **self._stopped(self._tick)})
+            self.traffic.step(self._commands)
         stamp_ns = self._tick * self._tick_ns
         self._begun_s = self.steady_s()
         state = self.traffic.state()
@@ -268,21 +267,11 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         if not self._inbox.awaits_anything:
             self._tick_over()
 
-    def _stopped(self, tick: int) -> dict[str, DriveCommand]:
-        """Commands to trains that stop of themselves during a tick."""
-        return {
-            stop.train: DriveCommand(emergency_brake=True)
-            for stop in self._stops
-            if stop.from_s <= tick * self._tick_ns * 1e-9 < stop.to_s
-        }
-
     def _publish_odometers(self, stamp_ns: int) -> None:
         if not self._odometers:
             return
-        travelled = self.traffic.travelled()
-        for train, publish in self._odometers.items():
-            values = np.array([self._wheels[train].count(1e-9 * stamp_ns, *travelled[train])])
-            publish(stamp_ns, values)
+        for train, values in self._counted.count(1e-9 * stamp_ns, self.traffic.travelled()):
+            self._odometers[train](stamp_ns, values)
 
     def _publish_truth(self, stamp_ns: int) -> None:
         for publish, (name, track, chainage_m, speed_mps) in zip(

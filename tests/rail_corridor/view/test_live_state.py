@@ -267,7 +267,7 @@ def test_the_strongest_brake_is_shown(
 ) -> None:
     corridor.tick(4, PLACES)
     topic = COMMAND.name(train="train_a", supervision="atp")
-    corridor.table(topic, COMMAND.columns, 20.0, *demands)
+    corridor.table(topic, COMMAND.columns, 20.0, *demands, 0, 0)
     train = corridor.frame()["trains"][0]
     assert (train["permitted_kmh"], train["brake"]) == (72.0, shown)
 

@@ -22,6 +22,7 @@ IDEAL: dict[str, Any] = {
     "max_power_w": 1e8,
     "max_service_brake_mps2": 1.0,
     "emergency_brake_mps2": 1.5,
+    "brake_build_up_s": 0.0,
     "max_speed_kmh": 360.0,
     "length_m": 100.0,
 }

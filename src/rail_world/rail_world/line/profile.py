@@ -61,6 +61,14 @@ class StepProfile:
         )
         return integral
 
+    def lowered(self, from_m: float, to_m: float, value: float) -> StepProfile:
+        """The profile with no more than a value between two positions."""
+        starts_m = np.unique(np.concatenate((self.starts_m, [from_m, to_m])))
+        values = self.at(starts_m)
+        inside = (starts_m >= from_m) & (starts_m < to_m)
+        values[inside] = np.minimum(values[inside], value)
+        return StepProfile(starts_m.tolist(), values.tolist())
+
     def part(self, from_m: float, to_m: float) -> list[tuple[float, float]]:
         """List (start, value) of the steps between two positions, the first at ``from_m``."""
         inner = (self.starts_m > from_m) & (self.starts_m < to_m)

@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from rail_msgs_py.quantities import (
+    ADHESION,
+    BRAKE_FACTOR,
     DIRECTION,
     FAULT_BEGIN,
     FAULT_END,
@@ -56,7 +58,16 @@ class VehicleDescription(Description):
     emergency_brake_mps2: StrictFloat = Field(
         ge=0.2, le=5.0, description="emergency braking on level track [m/s^2]"
     )
+    brake_build_up_s: StrictFloat = Field(
+        ge=0.0, le=10.0, description="from the demand to the full force of a brake, a ramp [s]"
+    )
     max_speed_kmh: Speed = Field(description="design speed [km/h]")
+    wheel_diameter_m: StrictFloat = Field(
+        ge=0.1, le=3.0, description="diameter of the wheel that the odometer counts [m]"
+    )
+    odometer_pulses: StrictFloat = Field(
+        ge=0.0, le=1e5, description="pulses per turn of that wheel; 0 = as fine as one likes"
+    )
     length_m: Annotated[StrictFloat, range_of(TRAIN_LENGTH)]
 
     @model_validator(mode="before")
@@ -147,6 +158,9 @@ class TrainDescription(Description):
     target_speed_kmh: Speed | None = Field(
         default=None, description="the driver goes no faster than this [km/h]"
     )
+    sight_m: StrictFloat = Field(
+        default=80.0, ge=10.0, le=1000.0, description="how far its driver sees on sight [m]"
+    )
     stop_at_m: tuple[Place, ...] = Field(
         default=(),
         max_length=10_000,
@@ -185,3 +199,33 @@ class WheelSlip(Description):
     from_s: Annotated[float, range_of(FAULT_BEGIN)]
     to_s: Annotated[float, range_of(FAULT_END)]
     ratio: Annotated[float, range_of(SLIP_RATIO)]
+
+
+class ReducedBraking(Description):
+    """Brakes that give a part of their force, from one time [s] to another."""
+
+    train: str
+    from_s: Annotated[float, range_of(FAULT_BEGIN)]
+    to_s: Annotated[float, range_of(FAULT_END)]
+    service: Annotated[float, range_of(BRAKE_FACTOR)]
+    emergency: Annotated[float, range_of(BRAKE_FACTOR)]
+
+
+class LowAdhesion(Description):
+    """Rails on which the wheels of a train slide and spin, from one time [s] to another."""
+
+    train: str
+    from_s: Annotated[float, range_of(FAULT_BEGIN)]
+    to_s: Annotated[float, range_of(FAULT_END)]
+    adhesion: Annotated[float, range_of(ADHESION)]
+
+
+class SpeedRestriction(Description):
+    """A lower limit on a stretch of a track, from one time [s] to another."""
+
+    track: str
+    from_m: float
+    to_m: float
+    speed_kmh: float
+    from_s: Annotated[float, range_of(FAULT_BEGIN)]
+    to_s: Annotated[float, range_of(FAULT_END)]

@@ -17,9 +17,11 @@ from math import inf, sqrt
 
 import numpy as np
 
+from rail_world.errors import WorldDataError
 from rail_world.line.profile import StepProfile
 from rail_world.line.route import Route
 
+from .description import SpeedRestriction, TrainDescription
 from .vehicle import Extent, Vehicle
 
 # The driver plans with this part of full service braking, unless slopes ask for less.
@@ -58,6 +60,18 @@ def limits_for_train(
             positions.append(corner)
             values.append(limit)
     return StepProfile(positions, values)
+
+
+def restricted_limits(route: Route, restrictions: Sequence[SpeedRestriction]) -> StepProfile:
+    """Limits along a route [m/s], with restrictions of its tracks."""
+    limits_mps = route.limits_mps
+    for each in restrictions:
+        for leg in route.legs:
+            to_m = min(each.to_m, leg.end_m)
+            if leg.track.name == each.track and each.from_m < to_m:
+                ends_m = leg.path_start_m + each.from_m, leg.path_start_m + to_m
+                limits_mps = limits_mps.lowered(*ends_m, each.speed_kmh / 3.6)
+    return limits_mps
 
 
 class BrakingEnvelope:
@@ -154,6 +168,8 @@ class Driver:
         Steepest slope on the route, as a ratio.
     target_speed_mps : float
         Speed the driver does not exceed in any case [m/s].
+    restrictions : sequence of SpeedRestriction
+        Boards on the line, which he keeps to.
 
     Attributes
     ----------
@@ -179,6 +195,7 @@ class Driver:
         *,
         steepest: float,
         target_speed_mps: float = inf,
+        restrictions: Sequence[SpeedRestriction] = (),
     ) -> None:
         brake = vehicle.service_brake_mps2
         self.deceleration_mps2 = min(
@@ -187,7 +204,7 @@ class Driver:
         if self.deceleration_mps2 < _LEAST_BRAKING_MPS2:
             raise ValueError(f"is too weak for a slope of {1e3 * steepest:g} per mille")
         self.limits_mps = limits_for_train(
-            route.limits_mps,
+            restricted_limits(route, restrictions),
             extent,
             length_m=route.length_m,
             cap_mps=min(vehicle.max_speed_mps, target_speed_mps),
@@ -196,3 +213,40 @@ class Driver:
             direction: BrakingEnvelope(self.limits_mps, direction, self.deceleration_mps2)
             for direction in (1, -1)
         }
+
+
+class Drivers:
+    """The driver of one train, by the boards that stand on the line.
+
+    Parameters
+    ----------
+    description : TrainDescription
+    route, vehicle, extent
+        See `Driver`.
+    """
+
+    def __init__(
+        self, description: TrainDescription, route: Route, vehicle: Vehicle, extent: Extent
+    ) -> None:
+        target_kmh = description.target_speed_kmh
+        self._field = f"trains.{description.name}.vehicle.max_service_brake_mps2"
+        self._target_mps = inf if target_kmh is None else target_kmh / 3.6
+        self._of = route, vehicle, extent
+        self._vehicle = vehicle
+        self._steepest = 1e-3 * float(np.max(np.abs(route.gradients_permil.values)))
+        self._known: dict[tuple[SpeedRestriction, ...], Driver] = {}
+
+    def keeping(self, restrictions: tuple[SpeedRestriction, ...]) -> Driver:
+        """Driver who keeps to some boards; WorldDataError if the brake is too weak."""
+        if restrictions not in self._known:
+            try:
+                self._known[restrictions] = Driver(
+                    *self._of,
+                    steepest=self._steepest,
+                    target_speed_mps=self._target_mps,
+                    restrictions=restrictions,
+                )
+            except ValueError as error:
+                brake_mps2 = self._vehicle.service_brake_mps2
+                raise WorldDataError(self._field, brake_mps2, str(error)) from None
+        return self._known[restrictions]

@@ -12,10 +12,11 @@ from typing import Literal
 
 from rail_world.errors import WorldDataError
 from rail_world.line.network import Network
-from rail_world.trains.description import TrainDescription
+from rail_world.trains.description import SpeedRestriction, TrainDescription
 
+from .brakes import Brakes
 from .drive_command import DriveCommand
-from .driver import Driver
+from .driver import Drivers
 from .itinerary import Itinerary, Target
 from .vehicle import Extent, LineForces, Vehicle
 
@@ -23,6 +24,9 @@ State = Literal["waiting", "running", "dwelling", "arrived"]
 
 _LONGEST_STEP_S = 0.1
 _AT_TARGET_M = 1e-3
+_SAME_MPS = 1e-9
+#: Who runs on sight stands this far before an obstacle [m].
+_BEFORE_OBSTACLE_M = 5.0
 _NO_COMMAND = DriveCommand()
 
 
@@ -68,8 +72,16 @@ class TrainMotion:
         length_m = self.vehicle.length_m
         extent = Extent(length_m, 0.0) if description.direction > 0 else Extent(0.0, length_m)
         self._forces = LineForces(self.route, extent)
-        self._driver = self._make_driver(extent)
+        self._extent = extent
+        self._drivers = Drivers(description, self.route, self.vehicle, extent)
+        self._driver = self._drivers.keeping(())
+        #: What slows it down, and what its wheels show of it.
+        self.brakes = Brakes(self.vehicle)
+        self._wheel_path_m = 0.0
+        #: Speed at which it came to the end of its track and went on, 0 if it did not [m/s].
+        self.ran_off_mps = 0.0
 
+        self._free_ahead_m = inf
         self._ticks = 0
         self._time_s = 0.0
         self._path_m = self._itinerary.start_m
@@ -84,20 +96,6 @@ class TrainMotion:
         self._check_initial_speed()
         if description.depart_s <= 0.0:
             self._start()
-
-    def _make_driver(self, extent: Extent) -> Driver:
-        target_kmh = self.description.target_speed_kmh
-        try:
-            return Driver(
-                self.route,
-                self.vehicle,
-                extent,
-                steepest=self._forces.steepest,
-                target_speed_mps=inf if target_kmh is None else target_kmh / 3.6,
-            )
-        except ValueError as error:
-            field = f"{self._field}.vehicle.max_service_brake_mps2"
-            raise WorldDataError(field, self.vehicle.service_brake_mps2, str(error)) from None
 
     def _check_initial_speed(self) -> None:
         speed_mps = self.description.speed_kmh / 3.6
@@ -161,6 +159,40 @@ class TrainMotion:
         return self._distance_m
 
     @property
+    def wheel_distance_m(self) -> float:
+        """Distance that the rims of its wheels have turned [m]: more or less where they slip."""
+        return self._wheel_path_m
+
+    @property
+    def low_m(self) -> float:
+        """Path distance of the end of the train at lesser chainage [m]."""
+        return self._path_m - self._extent.below_m
+
+    @property
+    def high_m(self) -> float:
+        """Path distance of the end of the train at greater chainage [m]."""
+        return self._path_m + self._extent.above_m
+
+    @property
+    def front_m(self) -> float:
+        """Path distance of the end that leads [m]."""
+        return self.high_m if self._direction > 0 else self.low_m
+
+    @property
+    def due(self) -> bool:
+        """Whether it waits although the time of its departure has come."""
+        late_s = self._time_s - self.description.depart_s
+        return self._state == "waiting" and late_s >= -1e-9
+
+    @property
+    def pulls(self) -> bool:
+        """Whether its motors can start it where it stands."""
+        specific = self._direction * self._forces.slope_sine(self._path_m)
+        specific += self._forces.curve_resistance(self._path_m)
+        drag = self.vehicle.running_resistance_mps2(0.0) + self.vehicle.gravity_mps2 * specific
+        return min(self.vehicle.traction_mps2(0.0), self.brakes.bears_mps2) > drag
+
+    @property
     def limit_mps(self) -> float:
         """Speed limit for the train as it stands, its whole length counted [m/s]."""
         return float(self._driver.limits_mps.at(self._path_m))
@@ -182,16 +214,31 @@ class TrainMotion:
 
     # --- motion -----------------------------------------------------------------------------
 
-    def step(self, command: DriveCommand | None = None) -> None:
+    def restrict(self, restrictions: tuple[SpeedRestriction, ...]) -> None:
+        """Have the driver keep to boards on the line from now on."""
+        self._driver = self._drivers.keeping(restrictions)
+
+    def step(
+        self,
+        command: DriveCommand | None = None,
+        *,
+        may_depart: bool = True,
+        free_ahead_m: float = inf,
+    ) -> None:
         """Move the train by one tick.
 
         Parameters
         ----------
         command : DriveCommand, optional
             What supervision imposes during this tick.
+        may_depart : bool
+            False for a train that waits at an entrance that is not free.
+        free_ahead_m : float
+            Way to the first obstacle ahead, which the driver sees if it is near enough [m].
         """
-        if self._state == "waiting" and self._time_s + 1e-9 >= self.description.depart_s:
+        if self.due and may_depart:
             self._start()
+        self._free_ahead_m = free_ahead_m
         before_mps = self._direction * self._speed_mps
         start_s = self._time_s
         for part in range(self._parts):
@@ -228,18 +275,36 @@ class TrainMotion:
         drag = vehicle.running_resistance_mps2(v) + vehicle.gravity_mps2 * specific
 
         envelope = self._driver.envelopes[self._direction]
+        brakes = self.brakes
         wanted = envelope.next_speed_mps(s, v, stop_s, dt)
+        # Before what he knows of, the driver applies the brake so early that it has built up.
+        wanted = max(wanted, self._braked(brakes.full_mps2(), drag) - _SAME_MPS)
         at_stop = wanted <= 0.0
-        wanted = min(wanted, v + (vehicle.traction_mps2(v) - drag) * dt)
+        pull = 0.0 if command.traction_cut_off else vehicle.traction_mps2(v)
+        wanted = min(wanted, v + (pull - drag) * dt)
         if stop_now:
             wanted = min(wanted, v - self._driver.deceleration_mps2 * dt)
-        full_service = v - (vehicle.service_brake_mps2 + drag) * dt
+        service = self._braked(brakes.building_up_mps2(dt), drag)
+        if command.on_sight:
+            sees_m = min(self.description.sight_m, self._free_ahead_m - _BEFORE_OBSTACLE_M)
+            sees_m -= 0.5 * v * vehicle.brake_build_up_s  # run until the brake acts
+            on_sight = envelope.next_speed_mps(s, v, s + max(sees_m, 0.0), dt)
+            wanted = min(wanted, max(on_sight, service))
+        effort = 0.0
         if command.emergency_brake:
-            wanted = min(wanted, v - (vehicle.emergency_brake_mps2 + drag) * dt)
+            effort = brakes.built_up_mps2(dt, emergency=True)
+            wanted = min(wanted, self._braked(brakes.building_up_mps2(dt, True), drag))
         elif command.service_brake:
-            wanted = min(wanted, full_service)
+            effort = brakes.built_up_mps2(dt)
+            wanted = min(wanted, service)
         elif wanted > command.max_speed_mps:
-            wanted = max(command.max_speed_mps, min(full_service, wanted))
+            wanted = max(command.max_speed_mps, min(service, wanted))
+            effort = brakes.built_up_mps2(dt) if wanted == service else 0.0
+        demand = (wanted - v) / dt + drag
+        if abs(demand) > brakes.bears_mps2:
+            held = min(max(demand, -brakes.bears_mps2), brakes.bears_mps2)
+            wanted = v + (held - drag) * dt if v > 0.0 or demand > 0.0 else 0.0
+        at_stop = at_stop and wanted <= 0.0
 
         if wanted > 0.0:
             moved_m = 0.5 * (v + wanted) * dt
@@ -250,10 +315,32 @@ class TrainMotion:
             moved_m = 0.5 * v * v * dt / (v - wanted) if wanted < v else 0.0
             if at_stop:
                 moved_m = min(moved_m, stop_s - s) if wanted < 0.0 else stop_s - s
+                moved_m = max(moved_m, 0.0)
+        brakes.effort_mps2 = max(effort, -demand if v > 0.0 else 0.0, 0.0)
         if stop_s == inf and self._target is not None:
             moved_m = self._run_out(self._target, moved_m)
+        moved_m = self._kept_on_track(moved_m)
         self._path_m += self._direction * moved_m
         self._distance_m += moved_m
+        self._free_ahead_m -= moved_m
+        brakes.turn_wheels(self._speed_mps, demand, dt)
+        self._wheel_path_m += moved_m + brakes.creep_mps * dt
+
+    def _braked(self, effort_mps2: float, drag_mps2: float) -> float:
+        """Speed at the end of a step with a brake effort; who stands is held."""
+        if self._speed_mps == 0.0:
+            return 0.0
+        return self._speed_mps - (effort_mps2 + drag_mps2) * self._dt_s
+
+    def _kept_on_track(self, moved_m: float) -> float:
+        """Way of a train that does not leave its route, but runs into what ends it."""
+        s = self._direction * self._path_m
+        left_m = (self.route.length_m if self._direction > 0 else 0.0) - s
+        if moved_m <= left_m + _AT_TARGET_M:
+            return min(moved_m, max(left_m, 0.0)) if left_m < moved_m else moved_m
+        self.ran_off_mps = self._speed_mps
+        self._speed_mps = 0.0
+        return max(left_m, 0.0)
 
     def _run_out(self, end: Target, moved_m: float) -> float:
         """Return how far the train moves, which is gone when it reaches the end of the track."""
@@ -302,7 +389,8 @@ class TrainMotion:
             self._depart()
 
     def _stand_if_there(self, target: Target, now_s: float) -> None:
-        if abs(target.path_m - self._path_m) <= _AT_TARGET_M:
+        # Who could not stop in time stands beyond it, and has been there all the same.
+        if self._direction * (target.path_m - self._path_m) <= _AT_TARGET_M:
             self._stand(target, now_s)
 
     def _leave(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,16 @@ from numpy.typing import NDArray
 from rail_world.line.network import Network
 from rail_world.line.route import Route
 
+from .conditions import Conditions
 from .description import TrainDescription
 from .drive_command import DriveCommand
 from .motion import TrainMotion
+from .occupancy import Fouling, Occupant, free_ahead_m, overlaps
 
 STEP_M = 0.25
 MOST_POINTS = 400_000
+#: Kept free on both sides of a train that enters [m].
+ENTRANCE_MARGIN_M = 10.0
 
 
 class Traffic:
@@ -27,35 +32,90 @@ class Traffic:
     network : Network
     tick_s : float
         Step.
+    conditions : Conditions, optional
+        What befalls the trains; may be exchanged for others on the way.
     """
 
     def __init__(
-        self, descriptions: Sequence[TrainDescription], network: Network, tick_s: float
+        self,
+        descriptions: Sequence[TrainDescription],
+        network: Network,
+        tick_s: float,
+        conditions: Conditions | None = None,
     ) -> None:
+        self.conditions = conditions or Conditions()
+        self._tick_s = tick_s
+        self._ticks = 0
+        self._fouling = Fouling(network)
         self.names = tuple(description.name for description in descriptions)
-        self._trains = [TrainMotion(d, network, tick_s) for d in descriptions]
+        #: As they are: for judging alone.
+        self.trains = [TrainMotion(d, network, tick_s) for d in descriptions]
         self._descriptions = tuple(descriptions)
         self._track_index = {name: index for index, name in enumerate(network.tracks)}
         # Trains with the same route are located in one call.
         groups: dict[tuple[str, ...], list[int]] = {}
-        for index, train in enumerate(self._trains):
+        for index, train in enumerate(self.trains):
             groups.setdefault(tuple(train.route.tracks), []).append(index)
         self._groups = [
-            (CentreLine(self._trains[members[0]].route), members) for members in groups.values()
+            (CentreLine(self.trains[members[0]].route), members) for members in groups.values()
         ]
-        self._state = np.zeros((len(self._trains), 10))
+        self._state = np.zeros((len(self.trains), 10))
+        #: Where those on the line are.
+        self.occupants = self._occupants()
 
     def step(self, commands: Mapping[str, DriveCommand] | None = None) -> None:
         """Move every train by one tick, under what supervision imposes on it by name."""
-        imposed = commands or {}
-        for name, train in zip(self.names, self._trains, strict=True):
-            train.step(imposed.get(name))
+        self._ticks += 1
+        time_s = self._ticks * self._tick_s
+        self.conditions.apply(time_s, self.trains)
+        imposed = self.conditions.commands(time_s, commands or {})
+        there = self.occupants
+        steps = []
+        for index, (name, train) in enumerate(zip(self.names, self.trains, strict=True)):
+            command = imposed.get(name)
+            ahead_m, free = inf, True
+            if command is not None and command.on_sight:
+                ahead_m = free_ahead_m(train.route, train.front_m, train.direction, index, there)
+            if train.due and train.description.enters_at_departure:
+                free = self.in_the_way(index, there) is None
+                if free:  # nobody else enters there in this tick
+                    there = [*there, self._occupant(index)]
+            steps.append((train, command, free, ahead_m))
+        for train, command, free, ahead_m in steps:
+            train.step(command, may_depart=free, free_ahead_m=ahead_m)
+        self.occupants = self._occupants()
+
+    def in_the_way(self, index: int, occupants: Sequence[Occupant]) -> int | None:
+        """Who is where a train is to enter, or within its braking distance; None if nobody is.
+
+        Of those that run, the way that they need to stop counts as well.
+        """
+        train = self.trains[index]
+        first = self._occupant(index, train.description.speed_kmh / 3.6, ENTRANCE_MARGIN_M)
+        for other in occupants:
+            moved = self._occupant(other.index, other.speed_mps)
+            if other.index != index and next(overlaps((first, moved)), None) is not None:
+                return other.index
+        return None
+
+    def _occupants(self) -> list[Occupant]:
+        there = range(len(self.trains))
+        return [self._occupant(index) for index in there if self._on_line(index)]
+
+    def _occupant(self, index: int, speed_mps: float = 0.0, margin_m: float = 0.0) -> Occupant:
+        """Where a train is, with the way to a stand from a speed and a margin at both ends."""
+        train = self.trains[index]
+        way_m = 0.5 * speed_mps * speed_mps / train.planned_deceleration_mps2
+        low_m = train.low_m - margin_m - (way_m if train.direction < 0 else 0.0)
+        high_m = train.high_m + margin_m + (way_m if train.direction > 0 else 0.0)
+        stretches = tuple(self._fouling.stretches(train.route, low_m, high_m))
+        return Occupant(index, stretches, train.direction, abs(train.speed_mps))
 
     def travelled(self) -> dict[str, tuple[float, float]]:
-        """Distance travelled [m] and speed [m/s] of each train."""
+        """Distance [m] and speed [m/s] of the rims of the wheels of each train."""
         return {
-            name: (train.distance_m, abs(train.speed_mps))
-            for name, train in zip(self.names, self._trains, strict=True)
+            name: (train.wheel_distance_m, abs(train.speed_mps) + train.brakes.creep_mps)
+            for name, train in zip(self.names, self.trains, strict=True)
         }
 
     def state(self) -> NDArray[np.float64]:
@@ -64,7 +124,7 @@ class Traffic:
         The array is reused: copy what must last.
         """
         state = self._state
-        for index, train in enumerate(self._trains):
+        for index, train in enumerate(self.trains):
             state[index, 0] = train.path_m
             state[index, 5] = train.speed_mps
             state[index, 6] = train.acceleration_mps2
@@ -77,17 +137,21 @@ class Traffic:
 
     def places(self) -> Iterator[tuple[str, str, float, float]]:
         """Name, track, chainage [m] and speed [m/s] of each train."""
-        for name, train in zip(self.names, self._trains, strict=True):
+        for name, train in zip(self.names, self.trains, strict=True):
             yield name, train.track, train.chainage_m, train.speed_mps
 
     @property
     def all_arrived(self) -> bool:
         """Whether no train has anywhere left to go."""
-        return all(train.state == "arrived" for train in self._trains)
+        return all(train.state == "arrived" for train in self.trains)
+
+    def on_line(self, index: int) -> bool:
+        """Whether a train is on the line: not before it enters, nor after it has left."""
+        return self._on_line(index) > 0.0
 
     def _on_line(self, index: int) -> float:
         """1 where the train is on the line: not before it enters, nor after it has left."""
-        train, description = self._trains[index], self._descriptions[index]
+        train, description = self.trains[index], self._descriptions[index]
         if description.enters_at_departure and train.state == "waiting":
             return 0.0
         return 0.0 if description.leaves_on_arrival and train.state == "arrived" else 1.0

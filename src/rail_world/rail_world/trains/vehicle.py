@@ -67,6 +67,9 @@ class Vehicle:
         self.max_speed_mps = description.max_speed_kmh / 3.6
         self.service_brake_mps2 = description.max_service_brake_mps2
         self.emergency_brake_mps2 = description.emergency_brake_mps2
+        self.brake_build_up_s = description.brake_build_up_s
+        #: Rotating over all of the mass, as speeds of the train move it.
+        self.rotating_share = 1.0 - 1.0 / description.rotating_mass_factor
         # Weight over effective mass: turns a specific force into an acceleration.
         self.gravity_mps2 = GRAVITY_MPS2 / description.rotating_mass_factor
         self._traction_mps2 = description.max_traction_n / self.effective_mass_kg

@@ -1,12 +1,13 @@
-"""What the wheels of a train count: an error of their diameter, and slip."""
+"""What the wheels of a train count: pulses, an error of their diameter, and slip."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import floor, pi
 
 import numpy as np
 
-from rail_world.trains.description import WheelSlip
+from rail_world.trains.description import VehicleDescription, WheelSlip
 
 
 class Wheels:
@@ -18,6 +19,9 @@ class Wheels:
         Relative error of their diameter.
     slips : sequence of WheelSlip
         When they slip; of several at once the first counts.
+    pulse_m : float
+        Distance that one pulse of the odometer stands for [m]; 0 = it counts without steps. Its
+        speed is taken from the time between pulses, and has no steps.
 
     Examples
     --------
@@ -26,7 +30,8 @@ class Wheels:
     ((10.0, 20.0), (15.0, 10.0), (35.0, 20.0))
     """
 
-    def __init__(self, error: float, slips: Sequence[WheelSlip] = ()) -> None:
+    def __init__(self, error: float, slips: Sequence[WheelSlip] = (), pulse_m: float = 0.0) -> None:
+        self._pulse_m = pulse_m
         self._scale = 1.0 + error
         #: When they slip; may be exchanged for others on the way.
         self.slips = tuple(slips)
@@ -37,7 +42,16 @@ class Wheels:
         ratio = next((s.ratio for s in self.slips if s.from_s <= time_s < s.to_s), 1.0)
         self._lost_m += (ratio - 1.0) * (travelled_m - self._travelled_m)
         self._travelled_m = travelled_m
-        return self._scale * (travelled_m + self._lost_m), self._scale * ratio * speed_mps
+        turned_m = self._scale * (travelled_m + self._lost_m)
+        if self._pulse_m > 0.0:
+            turned_m = floor(turned_m / self._pulse_m) * self._pulse_m
+        return turned_m, self._scale * ratio * speed_mps
+
+
+def pulse_m(vehicle: VehicleDescription) -> float:
+    """Distance of one pulse of the odometer of a train set [m], 0 if it counts without steps."""
+    pulses = vehicle.odometer_pulses
+    return pi * vehicle.wheel_diameter_m / pulses if pulses else 0.0
 
 
 def wheel_errors(seed: int, sigma: float, trains: Sequence[str]) -> dict[str, float]:

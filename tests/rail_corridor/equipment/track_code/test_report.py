@@ -92,6 +92,6 @@ def test_what_must_not_happen_is_seen() -> None:
 def test_interventions_are_counted_once_each() -> None:
     made = recording()
     for tick in (*range(40, 60), *range(80, 90)):
-        made[COMMAND].put(tick, 1, np.array([0.0, 1.0, 1.0, float(tick >= 80)]))
+        made[COMMAND].put(tick, 1, np.array([0.0, 1.0, 1.0, float(tick >= 80), 0.0, 0.0]))
     values = code_metrics(SCENARIO, made, 1)["atp"]
     assert (values["interventions"], values["emergency_brakes"]) == (2, 1)

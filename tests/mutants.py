@@ -586,21 +586,44 @@ MUTANTS: list[Mutant] = [
         f"{MESSAGES}/safe_channel.py",
         "rail_msgs_py/train_radio/test_safe_channel.py"
         " ::test_every_single_bit_matters ::test_repetition_and_order"
-        " ::test_age_counts_the_clock_skew_against_the_frame"
+        " ::test_a_session_is_given_up_after_silence"
         " ::test_wrong_train_wrong_way_wrong_kind_and_wrong_key"
         " ::test_recorded_greetings_neither_make_nor_cut_a_session",
         ("any safety code will do", "return code.matches(frame)", "return True"),
-        (
-            "frames of any age are taken",
-            "+ self._skew_ns > self._max_age_ns",
-            "< -self._max_age_ns",
-        ),
-        ("frames from the future are taken", "if age_ns < -self._skew_ns:", "if False:"),
         ("frames are taken again", "if number > newest:", "if number >= newest:"),
         ("frames are taken in any order", "if number > newest:", "if number != newest:"),
         ("any kind is taken", "header.kind not in self._accepts:", "header.kind > 15:"),
         ("any address will do", "if header.source != self.peer or", "if False and"),
-        ("nonces are drawn once", "self._offer = self._draw(NONCE_BYTES)", "pass"),
+    ),
+    *_group(
+        f"{MESSAGES}/safe_channel.py",
+        "rail_msgs_py/train_radio/test_unit_channel.py"
+        " ::test_no_frame_passes_that_was_held_back_longer_than_the_limit"
+        " ::test_a_jump_of_the_peers_clock_is_named"
+        " ::test_a_jump_that_hides_a_delay_is_bounded_by_ones_own_clock",
+        (
+            "frames of any age are taken",
+            "RejectionReason.TOO_OLD if age.most_ns > self._max_age_ns else None",
+            "None",
+        ),
+        ("a clock may jump", "return Rejected(RejectionReason.CLOCK_JUMPED)", "pass"),
+        (
+            "what was heard may be of any age",
+            "or time_ns - sent_ns > self._timeout_ns",
+            "or time_ns < sent_ns",
+        ),
+    ),
+    *_group(
+        f"{MESSAGES}/clock_offset.py",
+        "rail_msgs_py/train_radio/test_unit_channel.py"
+        " ::test_clocks_that_are_wrong_and_drift_cost_nothing"
+        " ::test_no_frame_passes_that_was_held_back_longer_than_the_limit",
+        ("bounds do not grow", "bounds[1] + grown_ns", "bounds[1] - grown_ns"),
+        (
+            "an age is that of the fastest clock",
+            "now_ns - stamp_ns + high",
+            "now_ns - stamp_ns + low",
+        ),
     ),
     *_group(
         f"{MESSAGES}/safe_frame.py",
@@ -612,11 +635,12 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{MESSAGES}/train_channel.py",
-        "rail_msgs_py/train_radio/test_safe_channel.py"
-        " ::test_frames_of_trains_may_be_three_ticks_old_or_a_second"
-        " ::test_a_train_that_is_switched_on_anew_draws_other_nonces",
-        ("frames may be 10 s old", "max(1.0, 3.0 * tick_s)", "max(10.0, 3.0 * tick_s)"),
-        ("nonces come again after a restart", "*([restarts] if restarts else [])", ""),
+        "rail_msgs_py/train_radio/test_unit_channel.py"
+        " ::test_frames_may_be_three_ticks_old_or_a_second"
+        " ::test_no_two_starts_have_one_nonce_in_whatever_process"
+        " ::test_what_was_recorded_before_a_restart_is_of_no_use_after_it",
+        ("frames may be 3 s old", "max(1.0, 3.0 * settings", "max(3.0, 3.0 * settings"),
+        ("nonces come again after a restart", "own, peer, stamp_ns]", "own, peer]"),
     ),
     # The localizer.
     *_group(

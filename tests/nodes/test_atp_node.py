@@ -21,7 +21,7 @@ from rail_msgs_py.train_radio.movement_authority import MovementAuthority
 from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.safe_result import Accepted
 from rail_msgs_py.train_radio.telegrams import Telegrams
-from rail_msgs_py.train_radio.train_channel import controller_end
+from rail_msgs_py.train_radio.train_channel import EndSettings, controller_end
 from rail_msgs_py.train_radio.train_report import WIDEST_M, LocationReport
 from rail_onboard.train_radio.atp_node import AtpNode
 
@@ -69,7 +69,9 @@ class Protection:
     @staticmethod
     def new_controller(given: dict[str, Any], **changes: Any) -> Any:
         given = given | changes
-        return controller_end(given["secret"], given["seed"], given["number"], given["tick_s"])
+        return controller_end(
+            EndSettings(given["secret"], given["seed"], given["number"], given["tick_s"])
+        )
 
     @property
     def now_ns(self) -> int:

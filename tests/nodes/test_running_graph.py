@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rail_corridor.cli.topic_docs import document, ends_of, main, parameters_of, type_name
+from rail_corridor.cli.topic_docs import declared_by, document, ends_of, main, type_name
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.equipment.registry import kind_of, node_kinds, topics
 from rail_corridor.loading.loader import load_scenario
@@ -105,7 +105,7 @@ def check_parameters(corridor: Corridor) -> None:
     """Every parameter that a node declares is one of its kind, described as there."""
     ros_own = {"use_sim_time", "start_type_description_service"}
     for kind, nodes in corridor.nodes.items():
-        fields = {field.name: field for field in dataclasses.fields(parameters_of(kind))}
+        fields = declared_by(kind)
         for node in nodes:
             declared = set(node.list_parameters([], 0).names)
             declared = {name for name in declared if not name.startswith("qos_overrides")}
@@ -143,7 +143,7 @@ def test_the_document_is_written_or_printed(
 
 def test_every_field_of_every_node_is_described() -> None:
     for kind in node_kinds():
-        for field in dataclasses.fields(parameters_of(kind)):
+        for field in declared_by(kind).values():
             assert quantity_of(field).text.strip()
             suffix = field.name.rpartition("_")[2]
             units = {"s": "s", "hz": "Hz", "m": "m", "dbm": "dBm"}

@@ -24,30 +24,36 @@ class Record:
 
     def __init__(self, rows: Sequence[str], columns: int) -> None:
         self._values = np.full((_FIRST_TICKS, len(rows), columns), np.nan)
+        # What is received may be that nothing is known, NaN.
+        self._is_here = np.zeros((_FIRST_TICKS, len(rows)), dtype=bool)
         self.rows = tuple(rows)
         self.ticks = 0
 
     def put(self, tick: int, row: int | slice, values: FloatArray) -> None:
         """Store one row, or the table of all of them."""
-        while tick >= len(self._values):
-            more = np.full_like(self._values, np.nan)
-            self._values = np.concatenate((self._values, more))
+        self._make_room(tick + 1)
         self._values[tick, row] = values
+        self._is_here[tick, row] = True
         self.ticks = max(self.ticks, tick + 1)
 
     def upto(self, ticks: int) -> FloatArray:
         """The first ticks, [tick, row, column]."""
+        self._make_room(ticks)
+        return self._values[:ticks]
+
+    def _make_room(self, ticks: int) -> None:
         while ticks > len(self._values):
             self._values = np.concatenate((self._values, np.full_like(self._values, np.nan)))
-        return self._values[:ticks]
+            self._is_here = np.concatenate((self._is_here, np.zeros_like(self._is_here)))
 
     def received(self, ticks: int) -> BoolArray:
         """Whether every row of each of the first ticks is here."""
-        return np.asarray(~np.isnan(self.upto(ticks)[:, :, 0]).any(axis=1))
+        self._make_room(ticks)
+        return np.asarray(self._is_here[:ticks].all(axis=1))
 
     def received_at(self, tick: int) -> bool:
         """Whether every row of a tick is here."""
-        return self.ticks > tick and not np.isnan(self._values[tick, :, 0]).any()
+        return self.ticks > tick and bool(self._is_here[tick].all())
 
 
 class EventRecord:

@@ -29,7 +29,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, get_args
 
 from lifecycle_msgs.msg import State
 
-from .node import CorridorMixin, CorridorNode, Equipment, Services
+from .equipment import Equipment
+from .node import CorridorMixin, CorridorNode, Services
 from .off_times import OffTimeParameters, OffTimes, off_times_of
 from .parameters import ParameterError, declare
 from .standalone import run_node

@@ -127,9 +127,8 @@ class ZoneControllerNode(
 
     def start_over(self) -> None:
         """Have seen no train, and have spoken with none."""
-        p = self._p
-        self._tracker = ZoneTracker(self._map, list(zip(p.trains, p.entry_zones, strict=True)))
-        self._issuer = authority_issuer_of(p)
+        self._tracker: ZoneTracker | None = None
+        self._issuer = authority_issuer_of(self._p)
 
     def _open_radio(self) -> None:
         """Open the ports of all base stations."""
@@ -154,12 +153,16 @@ class ZoneControllerNode(
         if not self.switched_on:
             self._keep_silent(stamp_ns)
             return
+        if self._tracker is None:
+            # What was told of trains at the start of the run holds for its first tick alone.
+            due = list(zip(self._p.trains, self._p.entry_zones, strict=True))
+            self._tracker = ZoneTracker(self._map, due, entering=stamp_ns == 0)
         readings = {zone: items[port] for zone, port in self._zone_ports.items() if port in items}
         fixes = self._tracker.update(stamp_ns * 1e-9, readings)
         for fix in fixes:
             self._publish(stamp_ns, fix)
-        self._authorise(stamp_ns, fixes, items)
-        self._report_zones(stamp_ns)
+        self._authorise(stamp_ns, self._tracker, fixes, items)
+        self._report_zones(stamp_ns, self._tracker)
         self._done(header_to_cdr(stamp_ns))
 
     def _keep_silent(self, stamp_ns: int) -> None:
@@ -178,7 +181,11 @@ class ZoneControllerNode(
         self._done(header_to_cdr(stamp_ns))
 
     def _authorise(
-        self, stamp_ns: int, fixes: Iterable[TrainFix], items: Mapping[str, Any]
+        self,
+        stamp_ns: int,
+        tracker: ZoneTracker,
+        fixes: Iterable[TrainFix],
+        items: Mapping[str, Any],
     ) -> None:
         """Take the trains' reports of a tick, and give authorities for the next one."""
         issuer = self._issuer
@@ -191,7 +198,12 @@ class ZoneControllerNode(
                     accepted.setdefault(slot, []).append(report)
         numbers = self._numbers
         for train, publish_reports in self._reports.items():
-            publish_reports(_reports(stamp_ns, accepted.get(numbers[train], ())))
+            taken = accepted.get(numbers[train], ())
+            publish_reports(_reports(stamp_ns, taken))
+            for sealed_s, said in taken:
+                if said.position_valid and said.segment < len(self._p.segments):
+                    place = (said.front_m, said.uncertainty_m, said.speed_mps)
+                    tracker.identify(train, self._p.segments[said.segment], sealed_s, *place)
         for fix in fixes:
             segment = self._segments.get(fix.track)
             if segment is not None:
@@ -227,8 +239,8 @@ class ZoneControllerNode(
         level = DiagnosticStatus.WARN if fix.reason else DiagnosticStatus.OK
         self.report(level, fix.train, fix.reason or "position known", stamp_ns=stamp_ns)
 
-    def _report_zones(self, stamp_ns: int) -> None:
-        unknown = ", ".join(self._tracker.unidentified)
+    def _report_zones(self, stamp_ns: int, tracker: ZoneTracker) -> None:
+        unknown = ", ".join(tracker.unidentified)
         self.report(
             DiagnosticStatus.WARN if unknown else DiagnosticStatus.OK,
             "train describer",

@@ -28,14 +28,21 @@ def test_a_record_grows_and_shows_its_gaps() -> None:
     assert record.upto(9000).shape == (9000, 2, 3)
 
 
-def recording(order: tuple[int, ...] = (0, 1, 2, 3), change: float = 0.0) -> RunData:
+def recording(
+    order: tuple[int, ...] = (0, 1, 2, 3), change: float = 0.0, without: Topic | None = None
+) -> RunData:
+    """Four ticks of two trains, without one topic of the last train in the last one."""
     made = run_data_of(load_scenario("two_trains"))
     for tick in order:
         made[STATE].put(tick, slice(None), np.full((2, 10), float(tick)))
-        made[LINKS].put(tick, slice(None), np.full((2, 4), float(tick)))
+        if not (tick == 3 and without is LINKS):
+            made[LINKS].put(tick, slice(None), np.full((2, 4), float(tick)))
         for train in range(2):
-            made[POSITION].put(tick, train, np.array([0.0, 10.0 * tick + train, 0.04, 20.0]))
-            made[VRS_CHANNEL].put(tick, train, np.array([1.0, 2.0, -50.0, np.nan]))
+            lost = without if (tick, train) == (3, 1) else None
+            if lost is not POSITION:
+                made[POSITION].put(tick, train, np.array([0.0, 10.0 * tick + train, 0.04, 20.0]))
+            if lost is not VRS_CHANNEL:
+                made[VRS_CHANNEL].put(tick, train, np.array([1.0, 2.0, -50.0, np.nan]))
     made[POSITION].put(2, 1, np.array([0.0, 21.0 + change, 0.04, 20.0]))
     return made
 
@@ -71,6 +78,11 @@ def test_the_digest_is_of_the_estimates_not_of_the_truth() -> None:
 def test_what_did_not_arrive_is_counted(part: Topic) -> None:
     whole = recording()
     assert (whole.ticks, whole.missing_ticks) == (4, 0)
-    broken = recording()
-    broken[part].put(2, 1, np.nan)
-    assert broken.missing_ticks == 1
+    broken = recording(without=part)
+    assert (broken.ticks, broken.missing_ticks) == (4, 1)
+
+
+def test_what_arrived_may_say_that_nothing_is_known() -> None:
+    unknown = recording()
+    unknown[POSITION].put(2, 1, np.nan)
+    assert unknown.missing_ticks == 0

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
-from rail_corridor.studies.threats import MAX_AGE_S, run_threat_campaign
+from rail_corridor.studies.threats import (
+    LATENCY_S,
+    MAX_AGE_S,
+    MakeEnd,
+    run_intruder_campaign,
+    run_threat_campaign,
+)
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
 from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_world.train_radio.frame_threats import Threat
@@ -51,7 +58,6 @@ def test_a_row_depends_on_its_seed_alone() -> None:
         ("_genuine", Threat.CORRUPTION, "not sealed by the peer for this end"),
         ("_genuine", Threat.INSERTION, "not sealed by the peer for this end"),
         ("_genuine", Threat.MASQUERADE, "not sealed by the peer for this end"),
-        ("_untimely", Threat.DELAY, "too old"),
         ("_misplaced", Threat.REPETITION, "accepted before, or out of order"),
         ("_misplaced", Threat.RESEQUENCING, "accepted before, or out of order"),
     ],
@@ -77,6 +83,50 @@ def test_nonces_alone_keep_out_what_was_recorded_before_a_restart(fixed: bool) -
 
     (row,) = run_threat_campaign(FRAMES, [[Threat.REPETITION]], make_end=make)
     assert (row.wrongly_accepted["from before the receiver's start"] > 0) is fixed, row
+
+
+def repeating(*, both: bool) -> MakeEnd:
+    """Ends that draw the nonces of before at every start; all else is as it should be."""
+
+    def make(own: int, peer: int, kind: FrameKind, draw: Callable[[int], bytes]) -> SafeChannel:
+        repeated = both or own != 1
+        nonces = np.random.default_rng([own, peer]).bytes if repeated else draw
+        settings = {"max_age_s": MAX_AGE_S, "least_delay_s": LATENCY_S}
+        return SafeChannel(SECRET, own, peer, [kind], nonces, **settings)
+
+    return make
+
+
+def test_who_plays_to_an_end_how_it_began_before_is_not_believed() -> None:
+    row = run_intruder_campaign("directed_replay", 10 * FRAMES)
+    assert row.restarts > 500 and row.attacks > 5000
+    assert not row.wrongly_accepted, row
+    assert row.accepted > 0.5 * row.frames
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_nonces_that_repeat_at_a_restart_are_found_out(both: bool) -> None:
+    row = run_intruder_campaign("directed_replay", FRAMES, make_end=repeating(both=both))
+    assert row.wrongly_accepted["session from a recorded greeting"] > 0, row
+    if both:
+        assert row.wrongly_accepted["from before the receiver's start"] > 0, row
+
+
+def test_frames_that_are_held_back_by_more_and_more_are_refused_in_time() -> None:
+    row = run_intruder_campaign("growing_delay", 10 * FRAMES)
+    assert row.attacks >= row.arrived > 0.9 * row.frames and row.restarts > 50
+    assert not row.wrongly_accepted, row
+    assert row.accepted > 0.3 * row.frames and row.rejected["too_old"] > 0.05 * row.frames
+
+
+def trusting(own: int, peer: int, kind: FrameKind, draw: Callable[[int], bytes]) -> SafeChannel:
+    """An end that looks at no age."""
+    return weak("_untimely")(SECRET, own, peer, [kind], draw, max_age_s=MAX_AGE_S)
+
+
+def test_the_oracle_sees_frames_that_are_too_old() -> None:
+    row = run_intruder_campaign("growing_delay", FRAMES, make_end=trusting)
+    assert row.wrongly_accepted["too old"] > 0, row
 
 
 def test_a_campaign_sends_something() -> None:

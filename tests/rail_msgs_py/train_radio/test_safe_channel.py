@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from rail_msgs_py.train_radio.safe_channel import SafeChannel
 from rail_msgs_py.train_radio.safe_frame import (
     FRAME_BYTES,
+    GREETING_BIT,
     DirectionKeys,
     FrameKind,
     Header,
@@ -27,7 +28,6 @@ from rail_msgs_py.train_radio.safe_result import (
     Rejected,
     RejectionReason,
 )
-from rail_msgs_py.train_radio.train_channel import controller_end, train_end
 
 SECRET = b"a secret for the tests"
 CONTROLLER, TRAIN, OTHER_TRAIN = 1, 101, 102
@@ -35,10 +35,11 @@ REPORT, AUTHORITY = FrameKind.LOCATION_REPORT, FrameKind.MOVEMENT_AUTHORITY
 SECOND = 1_000_000_000
 
 
-def end(own: int, peer: int, seed: int, skew_s: float = 0.0) -> SafeChannel:
+def end(own: int, peer: int, seed: int, drift: float = 0.0) -> SafeChannel:
+    """An end; its clocks do not drift unless said otherwise."""
     kind = REPORT if own == CONTROLLER else AUTHORITY
     draw = np.random.default_rng(seed).bytes
-    return SafeChannel(SECRET, own, peer, [kind], draw, max_age_s=1.0, clock_skew_s=skew_s)
+    return SafeChannel(SECRET, own, peer, [kind], draw, max_age_s=1.0, clock_drift=drift)
 
 
 def greet(one: SafeChannel, other: SafeChannel, time_ns: int) -> None:
@@ -53,10 +54,10 @@ def kind_from(sender: SafeChannel) -> FrameKind:
     return AUTHORITY if sender.own == CONTROLLER else REPORT
 
 
-def pair(skew_s: float = 0.0) -> tuple[SafeChannel, SafeChannel]:
+def pair() -> tuple[SafeChannel, SafeChannel]:
     """Controller and train in a session made at time 0."""
-    controller = end(CONTROLLER, TRAIN, 1, skew_s)
-    train = end(TRAIN, CONTROLLER, 2, skew_s)
+    controller = end(CONTROLLER, TRAIN, 1)
+    train = end(TRAIN, CONTROLLER, 2)
     greet(train, controller, 0)
     return controller, train
 
@@ -86,7 +87,7 @@ def test_a_frame_is_one_burst_and_stands_as_documented() -> None:
     _, train = pair()
     frame = train.seal(REPORT, b"payload", 4 * SECOND + 1999)
     assert len(frame) == FRAME_BYTES == 64
-    assert frame[0] == 0x11 and frame[1] == 7
+    assert frame[0] == 0x21 and frame[1] == 7
     assert frame[2:10].hex() == "0065000100000002"
     assert int.from_bytes(frame[10:16], "big") == 4_000_001
     assert frame[24:56] == b"payload".ljust(32, b"\0")
@@ -94,14 +95,18 @@ def test_a_frame_is_one_burst_and_stands_as_documented() -> None:
 
 def test_data_arrives_with_its_age_and_what_was_lost() -> None:
     controller, train = pair()
-    assert controller.silence_s(0) == 0.0 and math.isinf(train.silence_s(0))
+    assert controller.silence_s(0) == pytest.approx(0.0, abs=2e-6)
+    assert math.isinf(train.silence_s(0))
     for _ in range(3):
         train.seal(REPORT, b"lost", SECOND)
     opened = controller.open(train.seal(REPORT, b"here", 2 * SECOND), 2 * SECOND + 250_000_000)
-    assert opened == Accepted(REPORT, b"here", 0.25, 5, 3, 0)
-    assert controller.silence_s(5 * SECOND) == 3.0
+    # Nothing was taken from the controller but its first greeting.
+    age_s, doubt_s = pytest.approx(0.25, abs=2e-6), pytest.approx(0.0, abs=2e-6)
+    assert opened == Accepted(REPORT, b"here", age_s, doubt_s, 5, 3, GREETING_BIT | 1)
+    assert controller.silence_s(5 * SECOND) == pytest.approx(3.0, abs=2e-6)
     back = train.open(controller.seal(AUTHORITY, b"go", 3 * SECOND), 3 * SECOND)
-    assert back == Accepted(AUTHORITY, b"go", 0.0, 1, 0, 5)
+    assert isinstance(back, Accepted)
+    assert (back.kind, back.payload, back.sequence, back.feedback) == (AUTHORITY, b"go", 1, 5)
 
 
 def test_every_single_bit_matters() -> None:
@@ -168,20 +173,6 @@ def test_repetition_and_order() -> None:
     assert isinstance(controller.open(frames[2], SECOND), Accepted)
 
 
-@pytest.mark.parametrize("skew_s", [0.0, 0.1])
-def test_age_counts_the_clock_skew_against_the_frame(skew_s: float) -> None:
-    controller, train = pair(skew_s)
-    limit_ns = round((1.0 - skew_s) * SECOND)
-    opened = controller.open(train.seal(REPORT, b"", SECOND), SECOND + limit_ns)
-    assert isinstance(opened, Accepted) and opened.age_s == 1.0
-    late = train.seal(REPORT, b"", SECOND)
-    assert reason(controller.open(late, SECOND + limit_ns + 1)) is RejectionReason.TOO_OLD
-    early = train.seal(REPORT, b"", 2 * SECOND)
-    before_ns = 2 * SECOND - round(skew_s * SECOND)
-    assert reason(controller.open(early, before_ns - 1)) is RejectionReason.FROM_THE_FUTURE
-    assert isinstance(controller.open(early, before_ns), Accepted)
-
-
 def test_wrong_train_wrong_way_wrong_kind_and_wrong_key() -> None:
     controller, train = pair()
     other_end = end(CONTROLLER, OTHER_TRAIN, 4)
@@ -214,26 +205,6 @@ def test_what_is_thrown_back_at_its_sender_has_another_key() -> None:
     header = read_header(greeting)._replace(source=CONTROLLER, destination=TRAIN)
     mirrored = write_header(header) + greeting[24:]
     assert reason(train.open(mirrored, SECOND)) is RejectionReason.SAFETY_CODE
-
-
-@pytest.mark.parametrize(("tick_s", "oldest_s"), [(0.25, 1.0), (0.1, 1.0), (0.5, 1.5)])
-def test_frames_of_trains_may_be_three_ticks_old_or_a_second(
-    tick_s: float, oldest_s: float
-) -> None:
-    authentication_key, down = "00" * 16, FrameKind.MOVEMENT_AUTHORITY
-    for late_ns, taken in ((0, True), (1000, False)):
-        controller, train = (
-            controller_end(authentication_key, 1, 7, tick_s),
-            train_end(authentication_key, 1, 7, tick_s),
-        )
-        train.open(controller.seal(down, b"", 0), 0)
-        controller.open(train.seal(FrameKind.LOCATION_REPORT, b"", 0), 0)
-        frame = controller.seal(down, b"go", SECOND)
-        opened = train.open(frame, SECOND + round(oldest_s * 1e9) + late_ns)
-        if taken:
-            assert isinstance(opened, Accepted)
-        else:
-            assert opened == Rejected(RejectionReason.TOO_OLD)
 
 
 def test_a_receiver_that_restarted_takes_nothing_recorded_before() -> None:
@@ -282,9 +253,10 @@ def test_answers_leave_every_other_frame_to_data() -> None:
     controller.seal(AUTHORITY, b"", 0)  # its last frame was a greeting
     kinds = []
     for n in range(1, 7):
-        greeting = end(TRAIN, CONTROLLER, 20 + n).seal(REPORT, b"", n * SECOND)
-        assert controller.open(greeting, n * SECOND) == Greeted(False)
-        kinds.append(read_header(controller.seal(AUTHORITY, b"", n * SECOND // 2)).kind)
+        time_ns = n * SECOND // 2
+        greeting = end(TRAIN, CONTROLLER, 20 + n).seal(REPORT, b"", time_ns)
+        assert controller.open(greeting, time_ns) == Greeted(False)
+        kinds.append(read_header(controller.seal(AUTHORITY, b"", time_ns)).kind)
     assert kinds == [FrameKind.GREETING, AUTHORITY] * 3
     assert train.established
 
@@ -340,8 +312,10 @@ def test_bad_arguments_are_quoted() -> None:
         SafeChannel(b"abc", 1, 5, [REPORT], draw)
     with pytest.raises(ValueError, match=r"max_age_s .* got nan"):
         SafeChannel(SECRET, 1, 5, [REPORT], draw, max_age_s=math.nan)
-    with pytest.raises(ValueError, match=r"clock_skew_s .* got 2\.0"):
-        SafeChannel(SECRET, 1, 5, [REPORT], draw, clock_skew_s=2.0)
+    with pytest.raises(ValueError, match=r"least_delay_s .* got 2\.0"):
+        SafeChannel(SECRET, 1, 5, [REPORT], draw, least_delay_s=2.0)
+    with pytest.raises(ValueError, match=r"clock_drift .* got -1"):
+        SafeChannel(SECRET, 1, 5, [REPORT], draw, clock_drift=-1)
     with pytest.raises(ValueError, match=r"session_timeout_s .* got 0\.5"):
         SafeChannel(SECRET, 1, 5, [REPORT], draw, session_timeout_s=0.5)
     channel = SafeChannel(SECRET, 1, 5, [REPORT], draw)
@@ -351,21 +325,3 @@ def test_bad_arguments_are_quoted() -> None:
         channel.seal(REPORT, bytes(33), 0)
     with pytest.raises(ValueError, match=r"time_ns .* got -1"):
         channel.seal(REPORT, b"", -1)
-
-
-@pytest.mark.parametrize("restarts", [0, 1, 2])
-def test_a_train_that_is_switched_on_anew_draws_other_nonces(restarts: int) -> None:
-    """With those of before its greetings are taken for old ones of the session it has lost."""
-    authentication_key, tick_s = "00" * 16, 0.25
-    up, down = FrameKind.LOCATION_REPORT, FrameKind.MOVEMENT_AUTHORITY
-    controller = controller_end(authentication_key, 1, 7, tick_s)
-    before = train_end(authentication_key, 1, 7, tick_s)
-    before.open(controller.seal(down, b"", 0), 0)
-    controller.open(before.seal(up, b"", 0), 0)
-    assert controller.established
-    assert isinstance(before.open(controller.seal(down, b"", 0), 0), Accepted)
-    anew = train_end(authentication_key, 1, 7, tick_s, restarts)
-    assert controller.open(anew.seal(up, b"", 10**6), 10**6) == Greeted(False)
-    answer = anew.open(controller.seal(down, b"", 10**6), 10**6)
-    lost = Rejected(RejectionReason.UNKNOWN_SESSION)
-    assert answer == (Greeted(True) if restarts else lost)

@@ -271,6 +271,20 @@ def plan(
 
 
 @app.command()
+def keys(
+    scenario: ScenarioArgument,
+    file: Annotated[Path, typer.Argument(help="File to write; it must be new.", metavar="FILE")],
+) -> None:
+    """Draw a key for each train and the zone controller, for `cbtc.keys` of a scenario."""
+    loaded = _load(scenario, None, None, None, None, None, False)
+
+    from rail_corridor.equipment.train_radio.keys import write_keys
+
+    count = write_keys(loaded, file)
+    typer.echo(f"{count} keys written to {file}; name it in the scenario as cbtc.keys")
+
+
+@app.command()
 def scenarios() -> None:
     """List the built-in scenarios."""
     from rich.console import Console

@@ -14,7 +14,9 @@ from typing import Any, get_type_hints
 
 from rail_corridor.equipment.registry import node_kinds, topics
 from rail_msgs_py.message_definition import type_name
+from rail_msgs_py.off_times import OffTimeParameters
 from rail_msgs_py.quantity import Quantity, quantity_of
+from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.qos import ESTIMATE, LATCHED, OBSERVER_WINDOW_TICKS, STREAM, name_of
 from rail_msgs_py.topics.tick import CLOCK, DONE, FAILED
 from rail_msgs_py.topics.topic import Topic
@@ -57,12 +59,21 @@ def document() -> str:
 def tables() -> str:
     """Return the generated part: topics, columns, quality of service, parameters of nodes."""
     parts = [topic_table(), column_tables(), qos_table(), _PARAMETERS]
-    return "\n".join([*parts, *(parameter_table(kind) for kind in node_kinds())])
+    parts += [parameter_table(kind, parameters_of(kind)) for kind in node_kinds()]
+    return "\n".join([*parts, parameter_table("Every node but the world", OffTimeParameters)])
 
 
 def parameters_of(kind: str) -> Any:
     """Parameters of a kind of node."""
     return node_kinds()[kind].load().parameter_type
+
+
+def declared_by(kind: str) -> dict[str, dataclasses.Field[Any]]:
+    """Every parameter that a kind of node declares, by its name."""
+    parameters = [parameters_of(kind)]
+    if issubclass(node_kinds()[kind].load(), EquipmentNode):
+        parameters.append(OffTimeParameters)
+    return {field.name: field for each in parameters for field in dataclasses.fields(each)}
 
 
 def ends_of(topic: Topic) -> tuple[str, str]:
@@ -140,9 +151,8 @@ def qos_table() -> str:
     return "\n".join(rows) + "\n"
 
 
-def parameter_table(kind: str) -> str:
-    """Return the Markdown table of the parameters of one kind of node."""
-    parameters = parameters_of(kind)
+def parameter_table(kind: str, parameters: Any) -> str:
+    """Return the Markdown table of the parameters of a kind of node."""
     hints = get_type_hints(parameters)
     rows = [
         f"### {kind}\n",

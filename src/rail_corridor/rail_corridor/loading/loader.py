@@ -114,7 +114,14 @@ def scenario_from_data(
         else track.model_copy(update={"ttobench": str((directory / track.ttobench).absolute())})
         for name, track in scenario.tracks.items()
     }
-    scenario = scenario.model_copy(update={"trains": trains, "timetable": None, "tracks": tracks})
+    sections = {
+        section.name: plan.located(directory)
+        for subsystem in subsystems()
+        for section in subsystem.sections
+        if hasattr(plan := section.of(scenario), "located")
+    }
+    changes = {"trains": trains, "timetable": None, "tracks": tracks, **sections}
+    scenario = scenario.model_copy(update=changes)
     check_scenario(scenario, fields)
     if reverse:
         trains = turned_round(trains, scenario.network)

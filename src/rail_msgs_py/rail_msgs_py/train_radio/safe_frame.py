@@ -10,9 +10,10 @@ offset bytes field
 1      1     bytes of the payload in use, 0 to 32
 2      2     source
 4      2     destination
-6      4     sequence number in the session, from 1; 0 in a greeting
-10     6     time-stamp of the sender, 1 us, rounded down (never younger than it is)
-16     4     feedback: newest sequence number accepted from the destination
+6      4     number among the data of the session, or among the greetings, from 1
+10     6     time-stamp by the sender's clock, 1 us, rounded down
+16     4     feedback: number of the newest data taken from the destination; before any,
+             of the newest greeting that showed its nonce, with the highest bit set
 20     4     session mark; 0 in a greeting
 24     32    payload, filled up with zeros
 56     8     safety code over all that precedes
@@ -23,11 +24,11 @@ does not know the key, noise included, passes with 2^-64 = 5.4e-20 per frame: a 
 filled with forged bursts, one every 10 ms, sees one pass in 2^64 x 10 ms = 5.8e9 years
 (2e-14 per hour, where the tolerable hazard rate of SIL 4 is 1e-9). SP 800-38B, annex A, asks for
 64 bits or more; the whole 128 would not fit into a burst beside a movement authority, and buy
-nothing. One key makes at most 2^32 codes, far from the 2^48 that the same annex recommends.
+nothing. One key makes at most 2^31 codes, far from the 2^48 that the same annex recommends.
 
-Keys come from one secret of the scenario by HKDF-SHA256 (RFC 5869). Each direction of each pair
-has its own, so a frame that is read by another end, or thrown back to its sender, does not
-verify. Each session has its own, made from a nonce of either end: see `safe_channel`.
+Keys come from the secret of a pair of ends by HKDF-SHA256 (RFC 5869). Each direction has its own,
+so a frame that is read by another end, or thrown back to its sender, does not verify. Each session
+has its own, made from a nonce of either end: see `safe_channel`.
 """
 
 from __future__ import annotations
@@ -43,13 +44,15 @@ from cryptography.hazmat.primitives.cmac import CMAC
 from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 
-VERSION: Final = 1
+VERSION: Final = 2
 FRAME_BYTES: Final = 64
 PAYLOAD_BYTES: Final = 32
 CODE_BYTES: Final = 8
 NONCE_BYTES: Final = 16
 SHORTEST_KEY_BYTES: Final = 16
-LAST_SEQUENCE: Final = 2**32 - 1
+LAST_SEQUENCE: Final = 2**31 - 1
+#: In the feedback: it is the number of a greeting.
+GREETING_BIT: Final = 2**31
 NS_PER_TICK: Final = 1000
 LAST_TIME_NS: Final = 2**48 * NS_PER_TICK - 1
 
@@ -155,7 +158,7 @@ class DirectionKeys:
     Parameters
     ----------
     authentication_key : bytes
-        Of the scenario, 16 bytes at least.
+        Of the pair, 16 bytes at least.
     source, destination : int
         Identities of the two ends, 0 to 65535.
     """

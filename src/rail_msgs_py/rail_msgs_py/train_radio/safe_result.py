@@ -21,6 +21,7 @@ class RejectionReason(Enum):
     TOO_OLD = "too_old"
     REPEATED = "repeated"
     OUT_OF_ORDER = "out_of_order"
+    CLOCK_JUMPED = "clock_jumped"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,9 @@ class Accepted:
     kind : FrameKind
     payload : bytes
     age_s : float
-        Of the time-stamp, at most: the clock skew is added.
+        Time since it was sealed, at most, whatever the clocks of the two ends.
+    doubt_s : float
+        How much younger it may be.
     sequence : int
     lost : int
         Frames of this session missing between the one accepted before and this one.
@@ -43,6 +46,7 @@ class Accepted:
     kind: FrameKind
     payload: bytes
     age_s: float
+    doubt_s: float
     sequence: int
     lost: int
     feedback: int

@@ -30,7 +30,8 @@ from rail_msgs_py.topics.train_radio import ATP_STATE, RADIO_TELEGRAMS, TRAIN_TE
 from rail_msgs_py.topics.world import COMMAND, ODOMETER
 from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
-from rail_msgs_py.train_radio.train_channel import train_end
+from rail_msgs_py.train_radio.train_channel import EndSettings, train_end
+from rail_msgs_py.train_radio.unit_clock import ClockParameters, unit_clock_of
 from rail_onboard.braking_curve import GuaranteedBraking
 from rail_onboard.localizer.protected_interval import protected_interval
 from rail_onboard.track_code.supervision import SupervisionOutput, Thresholds
@@ -56,7 +57,7 @@ _SUPERVISED = (TrainMode.LOCATED, TrainMode.MOVING)
 
 
 @dataclass(frozen=True)
-class AtpParameters:
+class AtpParameters(ClockParameters):
     """Parameters of the protection on board."""
 
     number: int = parameter(1, "number of the train in telegrams", low=1, high=0xEFFF)
@@ -93,14 +94,14 @@ class AtpParameters:
     odometer_error: float = ALLOWED_ODOMETER_ERROR.parameter()
     authority_timeout_s: float = quantities.AUTHORITY_TIMEOUT.parameter()
     localizer: bool = parameter(False, "whether the position is that of a localizer")
-    secret: str = parameter("00" * 16, "of the safe channel, in hexadecimal digits")
+    secret: str = parameter("00" * 16, "its key with the zone controller, in hexadecimal digits")
     seed: int = SEED.parameter()
     tick_s: float = TICK.parameter()
     timeout_s: float = GIVE_UP.parameter()
 
 
-def protection_of(p: AtpParameters, restarts: int = 0) -> TrainProtection:
-    """Protection of the parameters, after it was switched on anew so often.
+def protection_of(p: AtpParameters) -> TrainProtection:
+    """Protection of the parameters.
 
     Raises
     ------
@@ -141,7 +142,7 @@ def protection_of(p: AtpParameters, restarts: int = 0) -> TrainProtection:
         delay_s=delay_s,
         fastest_mps=p.fastest_mps,
     )
-    channel = train_end(p.secret, p.seed, p.number, p.tick_s, restarts)
+    channel = train_end(EndSettings(p.secret, p.seed, p.number, p.tick_s, unit_clock_of(p)))
     identity = TrainIdentity(p.number, p.segment, p.start_m, p.placed_m, p.length_m)
     location = TrainLocation(p.odometer_error, limits=limits)
     return TrainProtection(identity, channel, location, modes)
@@ -164,7 +165,6 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
     def setup(self) -> None:
         """Open the ports of the train."""
         train = self.place
-        self._starts = 0
         self._radio = self.inputs.port(RADIO_TELEGRAMS, stamped(Telegrams.from_cdr), train=train)
         self._localizer = ""
         if self._p.localizer:
@@ -179,10 +179,8 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
         self._state = self.table_out(ATP_STATE, (train,), train=train)
 
     def start_over(self) -> None:
-        """Have no authority, and greet with nonces that were not used before."""
-        # Built and switched on for the first time it is the same equipment.
-        self._protection = protection_of(self._p, max(0, self._starts - 1))
-        self._starts += 1
+        """Have no authority, and no session with the zone controller."""
+        self._protection = protection_of(self._p)
 
     def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:
         """Judge place and speed by the authority, command the brakes, report the train."""

@@ -8,9 +8,8 @@ from math import inf, nan
 
 from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.train_radio.movement_authority import MovementAuthority
-from rail_msgs_py.train_radio.safe_channel import SafeChannel
 from rail_msgs_py.train_radio.safe_frame import FrameKind
-from rail_msgs_py.train_radio.train_channel import CountedChannel
+from rail_msgs_py.train_radio.train_channel import CountedChannel, FrameEnd
 from rail_msgs_py.train_radio.train_report import FASTEST_MPS, WIDEST_M, LocationReport
 from rail_onboard.track_code.supervision import SupervisionOutput
 
@@ -54,7 +53,7 @@ class TrainProtection:
     Parameters
     ----------
     identity : TrainIdentity
-    channel : SafeChannel
+    channel : FrameEnd
         To the zone controller.
     location : TrainLocation
     supervision : ModeSupervision
@@ -63,7 +62,7 @@ class TrainProtection:
     def __init__(
         self,
         identity: TrainIdentity,
-        channel: SafeChannel,
+        channel: FrameEnd,
         location: TrainLocation,
         supervision: ModeSupervision,
     ) -> None:
@@ -113,7 +112,7 @@ class TrainProtection:
                 self._location.place(time_s, train.start_m, train.placed_m)
         newest: ReceivedAuthority | None = None
         for frame in frames:
-            authority = self._read(frame, time_ns)
+            authority = self._read(frame, time_ns, max(abs(speed_mps), fastest_mps or 0.0))
             if authority is not None and (newest is None or authority.sealed_s > newest.sealed_s):
                 newest = authority
         doubted = localizer is None and self._location.odometer_doubted
@@ -132,7 +131,7 @@ class TrainProtection:
         self._braked = out.service_brake or out.emergency_brake
         return out
 
-    def _read(self, frame: bytes, time_ns: int) -> ReceivedAuthority | None:
+    def _read(self, frame: bytes, time_ns: int, fastest_mps: float) -> ReceivedAuthority | None:
         _, opened = self._channel.open(frame, time_ns)
         if opened is None:
             return None
@@ -148,8 +147,11 @@ class TrainProtection:
             return None
         sealed_s = time_ns / NANOSECONDS - opened.age_s
         if telegram.located is not None:
-            self._location.fix(sealed_s, *telegram.located)
-            self.relayed.append((sealed_s, *telegram.located))
+            at_m, half_m = telegram.located
+            # It may have been sealed later than it seems, when the train was farther on.
+            located = at_m, half_m + fastest_mps * opened.doubt_s
+            self._location.fix(sealed_s, *located)
+            self.relayed.append((sealed_s, *located))
         return ReceivedAuthority(
             sealed_s,
             telegram.end_of_authority_m,

@@ -70,6 +70,23 @@ class _TrackedTrain:
 
 
 @dataclass(frozen=True)
+class _SaidPlace:
+    """Where a train has said to be."""
+
+    track: str
+    time_s: float
+    front_m: float
+    half_m: float
+    speed_mps: float
+
+    def holds(self, time_s: float, chainage_m: float, slack_m: float) -> bool:
+        """Whether it can be at a place, later."""
+        elapsed_s = max(0.0, time_s - self.time_s)
+        run_m = self.speed_mps * elapsed_s + 0.5 * MAX_ACCELERATION_MPS2 * elapsed_s**2
+        return abs(chainage_m - self.front_m) <= self.half_m + slack_m + run_m
+
+
+@dataclass(frozen=True)
 class _ReadingPlace:
     zone: str
     chainage_m: float
@@ -119,16 +136,28 @@ class ZoneTracker:
     zone_map : ZoneMap
     trains : sequence of (train, zone)
         Trains in the order in which they enter the line, and the zone they are first seen in.
+    entering : bool
+        Whether they have yet to enter. One that is started later knows neither where they are nor
+        who is who; trains are identified by what they say themselves, see `identify`.
     """
 
-    def __init__(self, zone_map: ZoneMap, trains: Sequence[tuple[str, str]]) -> None:
-        self._map = zone_map
+    def __init__(
+        self, zone_map: ZoneMap, trains: Sequence[tuple[str, str]], *, entering: bool = True
+    ) -> None:
+        self._map, self._entering = zone_map, entering
+        self._said: dict[str, _SaidPlace] = {}
         self._trains = [
             _TrackedTrain(name, zone, zone_map.zones[zone].start_m) for name, zone in trains
         ]
         self._order = RunningOrder()
         self.unidentified: tuple[str, ...] = ()
         self.disturbed: tuple[str, ...] = ()
+
+    def identify(
+        self, train: str, track: str, time_s: float, front_m: float, half_m: float, speed_mps: float
+    ) -> None:
+        """Take where a train has said that it was, within a half-width, and how fast."""
+        self._said[train] = _SaidPlace(track, time_s, front_m, half_m, speed_mps)
 
     def update(self, time_s: float, readings: Mapping[str, ZoneReading]) -> list[TrainFix]:
         """Fixes of all trains from the readings [zone] of one tick."""
@@ -145,6 +174,8 @@ class ZoneTracker:
                     located_in.append(_ReadingPlace(name, *located))
         self.disturbed = tuple(disturbed)
         places = _Places(self._map, located_in)
+        if not self._entering:
+            self._identify(time_s, places)
         distances_m = places.distances_m()
         owners = self._assign(time_s, places, distances_m)
         owned = {*owners.values()}
@@ -160,6 +191,21 @@ class ZoneTracker:
             fixes.append(self._fix(train, index in owners, shared, readings))
         return fixes
 
+    def _identify(self, time_s: float, places: _Places) -> None:
+        """Take readings for those of trains that have said to be there, and no other there."""
+        for number, place in enumerate(places.all):
+            track, sigma_m = self._map.zones[place.zone].track, math.sqrt(place.variance_m2)
+            there = [
+                train
+                for train in self._trains
+                if (said := self._said.get(train.name)) is not None
+                and said.track == track
+                and said.holds(time_s, place.chainage_m, SIGMAS * sigma_m)
+            ]
+            if len(there) == 1 and not there[0].entered:
+                self._follow(there[0], time_s, places[number])
+                there[0].regained_s = time_s
+
     def _assign(
         self,
         time_s: float,
@@ -174,7 +220,7 @@ class ZoneTracker:
                 misses = self._misses(train, time_s, places)
                 followed = time_s - train.seen_s <= FOLLOWED_S
                 candidates.append(TrainCandidate(index, followed, misses))
-            elif train.zone not in due:
+            elif self._entering and train.zone not in due:
                 # Trains that are due at a zone enter there in their order.
                 due.add(train.zone)
                 here = dict.fromkeys(places.of(train.zone), 0.0)
@@ -288,7 +334,7 @@ class ZoneTracker:
             if math.isfinite(reading.variance_m2):
                 return train.fix
         if not train.entered:
-            reason = train.unknown
+            reason = train.unknown if self._entering else "not identified since the restart"
         elif train.zone in shared:
             reason = f"two trains in {train.zone}"
         elif (disturbed := self._disturbed_near(train)) is not None:

@@ -13,9 +13,8 @@ from math import inf, isfinite, nan, sqrt
 from typing import NamedTuple
 
 from rail_msgs_py.stamps import NANOSECONDS
-from rail_msgs_py.train_radio.safe_channel import SafeChannel
 from rail_msgs_py.train_radio.safe_frame import FrameKind
-from rail_msgs_py.train_radio.train_channel import CountedChannel
+from rail_msgs_py.train_radio.train_channel import CountedChannel, FrameEnd
 from rail_msgs_py.train_radio.train_report import LocationReport
 
 from .moving_block import IssuedAuthority, MovingBlock, to_telegram
@@ -75,7 +74,7 @@ class AuthorityIssuer:
     def __init__(
         self,
         block: MovingBlock,
-        channels: Mapping[int, SafeChannel],
+        channels: Mapping[int, FrameEnd],
         bases: Iterable[str],
         *,
         leaves_at_m: Mapping[int, float] | None = None,

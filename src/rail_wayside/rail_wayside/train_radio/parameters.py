@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from rail_msgs_py.parameters import ParameterError, parameter
 from rail_msgs_py.quantities import CLAIM_SIGMAS, PLACED, SEED, TICK
 from rail_msgs_py.train_radio import quantities
-from rail_msgs_py.train_radio.train_channel import controller_end
+from rail_msgs_py.train_radio.train_channel import EndSettings, controller_end
+from rail_msgs_py.train_radio.unit_clock import ClockParameters, unit_clock_of
 
 from .authority_issuer import AuthorityIssuer
 from .moving_block import MovingBlock
@@ -16,7 +17,7 @@ from .train_bounds import TrainStart
 
 
 @dataclass(frozen=True)
-class AuthorityParameters:
+class AuthorityParameters(ClockParameters):
     """Parameters of movement authorities; arrays over the trains unless said otherwise."""
 
     trains: tuple[str, ...] = parameter((), "trains, in the order they enter the line")
@@ -47,7 +48,7 @@ class AuthorityParameters:
     )
     validity_s: float = quantities.AUTHORITY_TIMEOUT.parameter()
     fix_sigmas: float = CLAIM_SIGMAS.parameter()
-    secret: str = parameter("00" * 16, "of the safe channels, in hexadecimal digits")
+    secrets: tuple[str, ...] = parameter((), "key with each train, in hexadecimal digits")
     seed: int = SEED.parameter()
     tick_s: float = TICK.parameter()
 
@@ -62,7 +63,7 @@ def authority_issuer_of(p: AuthorityParameters) -> AuthorityIssuer | None:
     """
     if not p.bases:
         return None
-    per_train = ("train_numbers", "train_lengths_m", "train_segments", "train_starts_m")
+    per_train = ("train_numbers", "train_lengths_m", "train_segments", "train_starts_m", "secrets")
     for name in (*per_train, "leaves_at_m"):
         if len(getattr(p, name)) != len(p.trains):
             raise ParameterError(
@@ -107,6 +108,10 @@ def _authority_issuer(p: AuthorityParameters) -> AuthorityIssuer:
         end_margin_m=p.end_margin_m,
         validity_s=p.validity_s,
     )
-    channels = {n: controller_end(p.secret, p.seed, n, p.tick_s) for n in p.train_numbers}
+    clock = unit_clock_of(p)
+    channels = {
+        number: controller_end(EndSettings(secret, p.seed, number, p.tick_s, clock))
+        for number, secret in zip(p.train_numbers, p.secrets, strict=True)
+    }
     leaves = {n: at for n, at in zip(p.train_numbers, p.leaves_at_m, strict=True) if at > 0.0}
     return AuthorityIssuer(block, channels, p.bases, leaves_at_m=leaves, fix_sigmas=p.fix_sigmas)

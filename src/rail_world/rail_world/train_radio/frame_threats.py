@@ -270,18 +270,18 @@ class FrameThreats:
 
     def _fitting(self, link: Link, frame: bytes, time_ns: int) -> None:
         content = self._rng.bytes(PAYLOAD_BYTES + CODE_BYTES)
-        self._add(link, self._next_header(frame, time_ns) + content, time_ns, Threat.INSERTION)
+        self._add(link, self._next_header(frame) + content, time_ns, Threat.INSERTION)
 
     def _renumbered(self, link: Link, frame: bytes, time_ns: int) -> None:
-        header = self._next_header(frame, time_ns)
+        header = self._next_header(frame)
         self._add(link, header + frame[len(header) :], time_ns, Threat.INSERTION)
 
-    def _next_header(self, frame: bytes, time_ns: int) -> bytes:
+    def _next_header(self, frame: bytes) -> bytes:
+        """Header of a frame that follows one, by the clock of its sender."""
         header = read_header(frame)
         sequence = min(header.sequence + 1 + self._below(4), LAST_SEQUENCE)
-        return write_header(
-            header._replace(sequence=sequence, time_ns=min(max(time_ns, 0), LAST_TIME_NS))
-        )
+        time_ns = min(header.time_ns + AFTER_NS, LAST_TIME_NS)
+        return write_header(header._replace(sequence=sequence, time_ns=time_ns))
 
     def _foreign(self, link: Link) -> tuple[bytes, int] | None:
         others = [other for other in self._recent if other != link]
@@ -305,7 +305,7 @@ class FrameThreats:
         self._add(link, head + foreign[0][len(head) :], time_ns, Threat.MASQUERADE)
 
     def _sealed_with_another_key(self, link: Link, frame: bytes, time_ns: int) -> None:
-        head = read_header(self._next_header(frame, time_ns) + payload_of(frame))
+        head = read_header(self._next_header(frame) + payload_of(frame))
         forged = self._wrong_key.seal(head, payload_of(frame))
         self._add(link, forged, time_ns, Threat.MASQUERADE)
 

@@ -90,9 +90,10 @@ def test_a_train_that_hears_nothing_brakes_after_the_time_out() -> None:
     for _ in range(8):
         corridor.step()
     reasons = [corridor.step(deaf=(2,))[2] for _ in range(16)]
-    # 3 s from the time-stamp, which was one tick old.
-    assert reasons.index("no authority") == 12 - 1
-    assert set(reasons[:11]) == {""} and set(reasons[11:]) == {"no authority"}
+    # 3 s from the time-stamp, which was one tick old, and may have been two: the train knows no
+    # least delay.
+    assert reasons.index("no authority") == 12 - 2
+    assert set(reasons[:10]) == {""} and set(reasons[10:]) == {"no authority"}
 
 
 def test_counts_tell_what_was_lost() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import ceil
 from operator import attrgetter
 
 import numpy as np
@@ -159,7 +160,7 @@ def test_a_missing_check_of_the_channel_is_seen(left_out: str, threat: Threat) -
 
 def test_authorities_that_a_missing_safety_code_lets_through_are_seen() -> None:
     weak = type("Weak", (SafeChannel,), {"_genuine": lambda *_: True})
-    made, _ = ride([Threat.CORRUPTION], 240, weak, 0.9)
+    made, _ = ride([Threat.CORRUPTION], 240, weak, 0.2)
     assert authorities(made) > 0
 
 
@@ -167,8 +168,10 @@ def test_authorities_that_a_missing_safety_code_lets_through_are_seen() -> None:
     ("sealed", "end_m", "forged"),
     [
         *((5, 505.0, 0), (5, 504.99, 0), (5, 504.98, 1), (5, 506.0, 1), (6, 505.0, 1)),
+        # Sealed at 5.5 at the earliest, and before it came at 7: at 6.
+        *((5.5, 506.0, 0), (5.5, 505.0, 1), (5.5, 507.0, 1)),
         # The controller is not on record at 8 and later.
-        *((7, 507.0, 0), (8, 507.0, 0), (8, 508.0, 1), (5.5, 505.0, 1), (-1, 500.0, 1)),
+        *((7, 507.0, 0), (8, 507.0, 0), (8, 508.0, 1), (-1, 500.0, 1), (11.5, 507.0, 1)),
     ],
 )
 def test_an_authority_is_genuine_if_it_was_given_then(
@@ -180,7 +183,8 @@ def test_an_authority_is_genuine_if_it_was_given_then(
     )
     given[:, AUTHORITY.columns.index("end_of_authority_m")] = 500.0 + np.arange(12)
     given[8:] = np.nan
-    for tick in range(9, 12):  # in force for three ticks: it counts once
+    # In force for some ticks: it counts once.
+    for tick in range(min(11, 1 + ceil(sealed)), 12):
         atp[tick, ATP_STATE.columns.index("end_of_authority_m")] = end_m
         atp[tick, ATP_STATE.columns.index("authority_age_s")] = (tick - sealed) * TICK_S
     assert forged_authorities(TICK_S, atp, given) == forged

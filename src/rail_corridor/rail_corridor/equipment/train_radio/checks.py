@@ -4,13 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rail_corridor.errors import InputError
+from rail_corridor.errors import InputError, did_you_mean
 from rail_corridor.scenario.model import Scenario
 from rail_signals.train_radio.slots import RadioSlots
 
-from .nodes import burst_format
+from .keys import pair_keys
+from .nodes import CONTROLLER, burst_format
 from .placement import bases_of
-from .section import CBTC, CbtcPlan, DeadBaseStation, NetworkThreats
+from .section import CBTC, CbtcPlan, ClockError, DeadBaseStation, NetworkThreats
+
+
+def _check_clocks(scenario: Scenario) -> None:
+    """See that clocks that are wrong are there, and each wrong in one way at a time."""
+    known = [CONTROLLER, *(f"/{train.name}/atp" for train in scenario.trains)]
+    begun: set[tuple[str, float]] = set()
+    for index, fault in enumerate(scenario.faults):
+        if not isinstance(fault, ClockError):
+            continue
+        field = f"faults.{index}"
+        if fault.node not in known:
+            reason = f"no such unit has a clock of its own{did_you_mean(fault.node, known)}"
+            raise InputError(reason, field=f"{field}.node", value=fault.node)
+        if (fault.node, fault.from_s) in begun:
+            reason = f"another fault of the clock of {fault.node} begins then"
+            raise InputError(reason, field=f"{field}.from_s", value=fault.from_s)
+        begun.add((fault.node, fault.from_s))
 
 
 def check_cbtc(scenario: Scenario, train_fields: Sequence[str]) -> None:
@@ -42,6 +60,8 @@ def check_cbtc(scenario: Scenario, train_fields: Sequence[str]) -> None:
                     value=getattr(train.vehicle, name),
                 )
     _check_signal(scenario, plan)
+    _check_clocks(scenario)
+    pair_keys(scenario)
     for index, loss in enumerate(plan.losses):
         track = scenario.network.tracks.get(loss.track)
         if track is None:
@@ -83,7 +103,7 @@ def _check_signal(scenario: Scenario, plan: CbtcPlan) -> None:
 def _check_faults(scenario: Scenario) -> None:
     bases = [base.name for base in bases_of(scenario)]
     for index, fault in enumerate(scenario.faults):
-        if not isinstance(fault, DeadBaseStation | NetworkThreats):
+        if not isinstance(fault, DeadBaseStation | NetworkThreats | ClockError):
             continue
         if not bases:
             raise InputError(

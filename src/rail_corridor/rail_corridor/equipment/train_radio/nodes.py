@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any, Final
@@ -21,11 +20,13 @@ from rail_signals.train_radio.symbol_mapping import constellation
 from rail_world.line.track import Track
 from rail_world.trains.vehicle import Vehicle
 
+from .keys import pair_keys
 from .placement import Base, bases_of
-from .section import CBTC, CbtcPlan
+from .section import CBTC, CbtcPlan, ClockError
 from .world import threats_of
 
 CBTC_MEDIUM: Final = "/world/cbtc_medium"
+CONTROLLER: Final = "/wayside/zone_controller"
 #: How far authorities reach past the end of a track whose trains go on.
 _BEYOND_M: Final = 2000.0
 #: No vehicle exceeds its highest speed by more.
@@ -74,9 +75,15 @@ def burst_format(plan: CbtcPlan) -> RadioBurstFormat:
     )
 
 
-def authentication_key(scenario: Scenario) -> str:
-    """Secret of the safe channels, as hexadecimal digits; of the seed, as every draw is."""
-    return hashlib.sha256(f"safe channels of seed {scenario.seed}".encode()).hexdigest()
+def clock_parameters(scenario: Scenario, node: str) -> dict[str, Any]:
+    """Parameters of the clock of a unit."""
+    faults = [f for f in scenario.faults if isinstance(f, ClockError) and f.node == node]
+    faults.sort(key=lambda fault: fault.from_s)
+    return {
+        "clock_from_s": tuple(fault.from_s for fault in faults),
+        "clock_offset_s": tuple(fault.offset_s for fault in faults),
+        "clock_drift_ppm": tuple(fault.drift_ppm for fault in faults),
+    }
 
 
 def radio_parameters(scenario: Scenario, plan: CbtcPlan) -> dict[str, Any]:
@@ -134,7 +141,8 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
         "on_sight_mps": on_sight_mps(releases),
         "odometer_error": CLAIM_SIGMAS.default * plan.odometer_error,
         "authority_timeout_s": plan.timeout_s,
-        "secret": authentication_key(scenario),
+        **clock_parameters(scenario, f"/{train.name}/atp"),
+        "secret": pair_keys(scenario)[train.name],
         "seed": scenario.seed,
         "tick_s": scenario.tick_s,
         "timeout_s": 3 * timeout_s / 5,
@@ -201,7 +209,8 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
         ),
         "margin_m": plan.margin_m,
         "validity_s": plan.timeout_s,
-        "secret": authentication_key(scenario),
+        **clock_parameters(scenario, CONTROLLER),
+        "secrets": tuple(pair_keys(scenario)[train.name] for train in by_departure),
         "seed": scenario.seed,
         "tick_s": scenario.tick_s,
     }

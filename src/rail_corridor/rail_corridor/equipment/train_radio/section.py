@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Final, Literal
 
 from pydantic import Field, model_validator
 
-from rail_corridor.scenario.faults import TimedFault
+from rail_corridor.scenario.faults import Fault, TimedFault
 from rail_corridor.scenario.model import Section
 from rail_corridor.scenario.section_fields import StrictInt
-from rail_msgs_py.quantities import CAB_SIGNALS, ODOMETER_ERROR
+from rail_msgs_py.quantities import CAB_SIGNALS, FAULT_BEGIN, ODOMETER_ERROR
 from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.quantities import carrier_hz
+from rail_msgs_py.train_radio.unit_clock import MOST_DRIFT_PPM, MOST_OFFSET_S
 from rail_world.line.description_base import Chainage, Description, Name, StrictFloat, field_of
 from rail_world.train_radio.threat_description import Threats
 
@@ -72,6 +74,15 @@ class CbtcPlan(Description):
     emergency_mps2: StrictFloat = field_of(quantities.EMERGENCY_BRAKING)
     margin_m: StrictFloat = field_of(quantities.MARGIN)
     timeout_s: StrictFloat = field_of(quantities.AUTHORITY_TIMEOUT)
+    keys: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=1000,
+        # Neither recordings nor the scenario that the world announces say where secrets lie.
+        exclude=True,
+        description="YAML file with the key of each train and the zone controller, made by "
+        "`rail keys`, named relative to the scenario; null = keys that follow from the seed",
+    )
     cab_signals: bool = field_of(CAB_SIGNALS)
     odometer_error: StrictFloat = field_of(ODOMETER_ERROR)
 
@@ -80,6 +91,12 @@ class CbtcPlan(Description):
         if self.emergency_mps2 < self.braking_mps2:
             raise ValueError(f"emergency_mps2: is weaker than braking_mps2, {self.braking_mps2:g}")
         return self
+
+    def located(self, directory: Path) -> CbtcPlan:
+        """The section with the names of its files made absolute."""
+        if self.keys is None:
+            return self
+        return self.model_copy(update={"keys": str((directory / self.keys).absolute())})
 
     @property
     def downlinks_hz(self) -> dict[int, float]:
@@ -120,6 +137,30 @@ class NetworkThreats(TimedFault):
     def subject(self) -> str:
         """The threats."""
         return ", ".join(threat.value for threat in self.threats)
+
+
+class ClockError(Fault):
+    """A unit whose clock is wrong from a time on, until another such fault of its begins."""
+
+    kind: Literal["clock"]
+    node: str = Field(
+        max_length=200,
+        description="full name of a unit with a clock: `/train_1/atp` or "
+        "`/wayside/zone_controller`",
+    )
+    offset_s: StrictFloat = Field(
+        default=0.0,
+        ge=-MOST_OFFSET_S,
+        le=MOST_OFFSET_S,
+        description="by how much it is ahead then [s]",
+    )
+    drift_ppm: StrictFloat = Field(
+        default=0.0,
+        ge=-MOST_DRIFT_PPM,
+        le=MOST_DRIFT_PPM,
+        description="how much it gains from then on [ppm]; frames are exchanged up to 200",
+    )
+    from_s: StrictFloat = field_of(FAULT_BEGIN)
 
 
 CBTC: Final[Section[CbtcPlan | None]] = Section(

@@ -29,7 +29,7 @@ from .checks import check_cbtc
 from .nodes import burst_format, cbtc_nodes, controller_parameters, radio_parameters
 from .placement import bases_of
 from .report import authority_table, cbtc_metrics
-from .section import CBTC, DeadBaseStation, NetworkThreats
+from .section import CBTC, ClockError, DeadBaseStation, NetworkThreats
 from .threat_metrics import threat_line, threat_metrics
 from .world import cbtc_description, threats_of
 
@@ -41,7 +41,7 @@ class TrainRadioSubsystem(Subsystem):
 
     name = "train_radio"
     sections = (CBTC,)
-    faults = (DeadBaseStation, NetworkThreats)
+    faults = (DeadBaseStation, NetworkThreats, ClockError)
     hazards = (
         "trains.*.cbtc.forged_accepted",
         "trains.*.cbtc.forged_reports",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -48,40 +49,46 @@ def threat_line(report: Mapping[str, Any]) -> str | None:
 def forged_authorities(tick_s: float, atp: FloatArray, issued: FloatArray) -> int:
     """Authorities in force on board that the zone controller has not given to this train.
 
-    ``atp`` and ``issued`` are its tables [tick, column]. A genuine one has the end that was given
-    at its time-stamp. Where that tick of the controller is not on record, as when it died, any
-    end that it ever gave will do.
+    ``atp`` and ``issued`` are its tables [tick, column]. A genuine one has an end that was given
+    since the earliest time at which it can have been sealed, which is what the train knows, and
+    before it came. Where one of these ticks of the controller is not on record, as when it died,
+    any end that it ever gave will do.
     """
     end_m, age_s = (
         atp[:, ATP_STATE.index["end_of_authority_m"]],
         atp[:, ATP_STATE.index["authority_age_s"]],
     )
-    held = np.flatnonzero(np.isfinite(end_m) & np.isfinite(age_s))
-    sealed_s = np.round(held * tick_s - age_s[held], 6)
+    first: dict[tuple[float, float], int] = {}
+    for tick in np.flatnonzero(np.isfinite(end_m) & np.isfinite(age_s)).tolist():
+        first.setdefault((round(tick * tick_s - age_s[tick], 6), float(end_m[tick])), tick)
     issued_m = issued[:, AUTHORITY.index["end_of_authority_m"]]
     silent = np.isnan(issued[:, AUTHORITY.index["accepted"]])
     ever_m = issued_m[np.isfinite(issued_m)]
     forged = 0
-    for time_s, reported_m in sorted(
-        set(zip(sealed_s.tolist(), end_m[held].tolist(), strict=True))
-    ):
-        then = round(time_s / tick_s)
-        if not 0 <= then < len(issued_m) or abs(time_s - then * tick_s) > _SAME_S:
+    for (sealed_s, reported_m), tick in first.items():
+        since = _first_tick(sealed_s, tick_s)
+        until = max(since + 1, tick)
+        if not 0 <= since <= tick:
             forged += 1
             continue
-        wanted_m = ever_m if silent[then] else issued_m[then : then + 1]
+        wanted_m = ever_m if silent[since:until].any() else issued_m[since:until]
         forged += not np.any(np.abs(wanted_m - reported_m) <= _ROUNDING_M)
     return forged
+
+
+def _first_tick(time_s: float, tick_s: float) -> int:
+    """First tick that is not before a time."""
+    return ceil((time_s - _SAME_S) / tick_s)
 
 
 def report_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str, int]:
     """Location reports that the zone controller took from a train, and those not given by it.
 
-    A genuine one tells, to the last bit, where the train believed to be at its time-stamp, is of
-    this train on its track, comes after all that were taken before it, and is no older than the
-    safe channel allows. The speed is not compared: what the odometer said is not on record. A
-    report of a tick whose belief is not on record is not judged, unless the train was silent by
-    then.
+    A genuine one tells, to the last bit, where the train believed to be at a time since it can
+    have been sealed, is of this train on its track, comes after all that were taken before it, and
+    is no older than the safe channel allows. The speed is not compared: what the odometer said is
+    not on record. A report of ticks whose belief is not on record is not judged, unless the train
+    was silent by then.
     """
     believed = recording[ATP_STATE].upto(recording.ticks)[:, index]
     recorded = ~np.isnan(believed[:, ATP_STATE.index["accepted"]])
@@ -99,19 +106,19 @@ def report_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[s
     for tick, row in recording.events(REPORTS).of(index, recording.ticks):
         accepted += 1
         sealed_s = row[REPORTS.index["sealed_s"]]
-        then = round(sealed_s / scenario.tick_s)
-        timely = (
-            newest < then <= tick
-            and then < silent
-            and abs(sealed_s - then * scenario.tick_s) <= _SAME_S
-            and tick * scenario.tick_s - sealed_s <= oldest_s
-        )
-        newest = max(newest, then)
-        if not timely:
+        since = max(newest + 1, _first_tick(sealed_s, scenario.tick_s))
+        ticks = range(since, min(tick + 1, silent))
+        named = all(row[REPORTS.index[name]] == value for name, value in own.items())
+        told = [
+            then
+            for then in ticks
+            if then >= len(recorded)
+            or not recorded[then]
+            or (named and _same_place(row, believed[then]))
+        ]
+        if not told or tick * scenario.tick_s - sealed_s > oldest_s:
             forged += 1
-        elif then < len(recorded) and recorded[then]:
-            named = all(row[REPORTS.index[name]] == value for name, value in own.items())
-            forged += not (named and _same_place(row, believed[then]))
+        newest = told[0] if told else max(newest, since)
     return {"reports_taken": accepted, "forged_reports": forged}
 
 

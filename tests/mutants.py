@@ -243,13 +243,13 @@ MUTANTS: list[Mutant] = [
         ("every cut is an excuse", "if cut and end_m", "if cut or end_m"),
         (
             "mislocated is 0",
-            "int(np.count_nonzero(claimed & ~(error_m <= half_m)))",
-            "0",
+            '{"mislocated": int(np.count_nonzero(mislocated))}',
+            '{"mislocated": 0}',
         ),
         (
             "a place that is no number is right",
-            "claimed & ~(error_m <= half_m)",
-            "claimed & (error_m > half_m)",
+            "(half_m != math.inf) & ~(error_m <= half_m)",
+            "(half_m != math.inf) & (error_m > half_m)",
         ),
     ),
     *_group(

@@ -125,6 +125,8 @@ class RunBuilder:
             warning=0.0,
             service_brake=service_brake,
             emergency_brake=emergency_brake,
+            traction_cut_off=0.0,
+            on_sight=0.0,
         )
         return self
 

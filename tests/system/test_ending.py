@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from rail_corridor.run.exit_codes import HALF_GONE, UNSAFE
 from rail_msgs_py.topics.tick import CLOCK, OBSERVED
 
 if TYPE_CHECKING:
@@ -129,7 +130,7 @@ def test_the_halves_of_a_corridor_end_together(
     asked_s = time.monotonic()
     halves[first].send_signal(number)
     assert rail.finish(halves[first]) == code
-    assert rail.finish(halves[second]) == 3
+    assert rail.finish(halves[second]) == HALF_GONE
     assert time.monotonic() - asked_s < 20.0
     line = f"the {first} half has ended: so this one ends"
     assert line in rail.output(halves[second])
@@ -138,7 +139,26 @@ def test_the_halves_of_a_corridor_end_together(
 @pytest.mark.parametrize("part", ["onboard", "report"])
 def test_a_part_whose_world_never_comes_ends(rail: Rail, part: str) -> None:
     run = rail.start("run", "plain_line", "--timeout", 1, "--only", part)
-    assert rail.finish(run) == 3
+    assert rail.finish(run) == HALF_GONE
     rest = {"onboard": "the wayside half", "report": "the corridor itself"}[part]
     assert f"waiting for {rest}" in rail.output(run)
     assert f"{rest} has not come: so this one ends" in rail.output(run)
+
+
+def test_a_run_in_which_trains_collide_ends_with_its_verdict_and_its_code(rail: Rail) -> None:
+    scenario = {
+        "name": "head_on",
+        "duration_s": 40.0,
+        "tracks": {"main": {"elements": [{"straight_m": 1500}]}},
+        "stations": {"zone_length_m": 300},
+        "trains": [
+            {"name": "up", "route": ["main"], "start_m": 400},
+            {"name": "down", "route": ["main"], "start_m": 1000, "direction": -1},
+        ],
+    }
+    path = rail.directory / "head_on.yaml"
+    path.write_text(json.dumps(scenario))
+    run = rail.start("run", path, "--processes", "one")
+    assert rail.finish(run) == UNSAFE
+    last = rail.output(run).strip().splitlines()[-1]
+    assert last.startswith("unsafe: collision of up and down at ")

@@ -11,6 +11,14 @@ SEED: Final = Quantity(1, "seed of every random draw", low=0, high=2**63 - 1)
 
 END_WHEN_ARRIVED: Final = Quantity(False, "whether to end earlier, once every train has arrived")
 
+PATIENCE: Final = Quantity(
+    60.0,
+    "a train that stands for longer without a reason is stuck",
+    unit="s",
+    low=1.0,
+    high=1e5,
+)
+
 FAULT_BEGIN: Final = Quantity(0.0, "start", unit="s", low=0.0, high=1e6)
 FAULT_END: Final = Quantity(1e6, "end", unit="s", low=0.0, high=1e6)
 SLIP_RATIO: Final = Quantity(

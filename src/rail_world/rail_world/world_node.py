@@ -9,7 +9,6 @@ Topics out: ``/clock``, ``/world/state``, ``/world/<train>/odometry``, ``/world/
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from math import inf
 from typing import Any
@@ -19,9 +18,7 @@ from std_msgs.msg import Header, String
 
 from rail_msgs_py.failures import WATCH_PERIOD_S, FailureWatch, HeldUp
 from rail_msgs_py.inbox import TickInbox
-from rail_msgs_py.parameters import parameter
 from rail_msgs_py.position import Position, PositionWriter
-from rail_msgs_py.quantities import CAB_SIGNALS, END_WHEN_ARRIVED, GIVE_UP
 from rail_msgs_py.stamps import NANOSECONDS, clock_from_cdr, clock_to_cdr, to_ns
 from rail_msgs_py.table import values_from_cdr
 from rail_msgs_py.tick_node import TickNode
@@ -47,41 +44,22 @@ from rail_msgs_py.topics.world import (
 )
 from rail_world.line.corridor_map import markers, path_of
 from rail_world.trains.drive_command import DriveCommand
+from rail_world.trains.judge import Judge
 from rail_world.trains.odometers import Odometers
 from rail_world.trains.traffic import Traffic
 
 from .steps import Steps
 from .world_file import WorldFile, read_world_file
+from .world_parameters import WorldParameters
 
 _NOT_RECEIVED = DriveCommand(emergency_brake=True)
+_LEVELS = {
+    "ok": DiagnosticStatus.OK,
+    "warn": DiagnosticStatus.WARN,
+    "error": DiagnosticStatus.ERROR,
+}
 #: Wall time of a tick that nobody answers any longer [s]: who comes back must be able to follow.
 _UNANSWERED_S = 0.001
-
-
-@dataclass(frozen=True)
-class WorldParameters:
-    """Parameters of the world."""
-
-    world_file: str = parameter("", "JSON file with tracks, trains and media")
-    ticks: int = parameter(0, "length of the run; 0 = until stopped", unit="ticks", low=0)
-    rate: float = parameter(
-        0.0, "simulated seconds per second; 0 = as fast as possible", low=0.0, high=1e6
-    )
-    nodes: tuple[str, ...] = parameter((), "full names of the nodes that must be ready first")
-    sinks: tuple[str, ...] = parameter((), "full names of the nodes whose `done` ends a tick")
-    clock_readers: int = parameter(0, "readers of the clock that must be connected first", low=0)
-    end_when_arrived: bool = END_WHEN_ARRIVED.parameter()
-    supervised: tuple[str, ...] = parameter((), "trains that wait for a command in every tick")
-    odometers: tuple[str, ...] = parameter((), "trains whose wheels are listened to")
-    supervision: str = parameter(
-        "code_supervision", "name of the node on each of them that commands it"
-    )
-    cab_signals: bool = CAB_SIGNALS.parameter()
-    observed: bool = parameter(False, "whether to stay within reach of the report")
-    timeout_s: float = GIVE_UP.but(default=5.0).parameter()
-    start_timeout_s: float = parameter(
-        60.0, "wall time without a sign of a node at the start", unit="s", low=0.1, high=7200.0
-    )
 
 
 class WorldNode(TickNode[WorldParameters], name="world"):
@@ -94,6 +72,13 @@ class WorldNode(TickNode[WorldParameters], name="world"):
         self._tick_ns = described.tick_ns
         #: The trains as they are: for judging alone.
         self.traffic = Traffic(described.trains, network, described.tick_s, described.conditions)
+        self._judge = Judge(
+            self.traffic,
+            network,
+            quiet_from_s=described.quiet_from_s,
+            patience_s=self._p.patience_s,
+            queue_m=self._p.queue_m,
+        )
         self._tick = -1
         self._begun_s = self._started_s = self.steady_s()
         self._sign_s: float | None = None
@@ -227,6 +212,7 @@ class WorldNode(TickNode[WorldParameters], name="world"):
     def take_faults(self, world: WorldFile) -> None:
         """Go on with other faults of trains, all else being as it was."""
         self.traffic.conditions = world.conditions
+        self._judge.quiet_from_s = world.quiet_from_s
         self._counted.slip(world.slips)
 
     @property
@@ -263,6 +249,9 @@ class WorldNode(TickNode[WorldParameters], name="world"):
             self._publish_truth(stamp_ns)
         self._publish_odometers(stamp_ns)
         self.at_tick(stamp_ns)
+        for event in self._judge.judge(1e-9 * stamp_ns, self._commands):
+            level = _LEVELS[event.level]
+            self.report(level, event.subject, event.message, event.values, stamp_ns)
         self._begin_tick(clock_to_cdr(stamp_ns))
         if not self._inbox.awaits_anything:
             self._tick_over()

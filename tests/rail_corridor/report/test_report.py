@@ -22,6 +22,7 @@ from rail_msgs_py.topics.world import STATE
 KEYS = {
     *("scenario", "seed", "ticks", "sim_time_s", "wall_time_s", "real_time_factor", "nodes"),
     *("processes", "complete", "digest", "failures", "events", "trains", "missing_ticks"),
+    *("verdict", "reasons", "event_counts"),
 }
 
 

@@ -359,3 +359,35 @@ def test_a_known_position_is_never_that_of_another_train(seed: int) -> None:
                 seen += 1
                 assert abs(wayside.error_m(fix)) < GATE_M, (fix, time_s)
     assert seen > 200
+
+
+# Leaving ----------------------------------------------------------------------------------
+
+
+def leaving(stops_at_m: float = math.inf) -> Run:
+    """Return a run at 20 m/s out of the line, which ends at 1000 m."""
+
+    def run(time_s: float) -> Place | None:
+        way_m = min(600.0 + 20.0 * time_s, stops_at_m)
+        return ("main", way_m) if way_m < 1000.0 else None
+
+    return run
+
+
+def test_a_train_that_ran_out_of_the_line_is_in_no_zone_any_more() -> None:
+    wayside = Wayside({"a": leaving(), "b": main_line(400.0, 20.0)}, {"a": "z4", "b": "z3"})
+    for time_s in times(28.0):
+        fixes = wayside.tick(time_s)
+    assert not known(fixes["a"]) and fixes["a"].reason == "has left the line past z5"
+    # So the other is known in that zone, alone.
+    assert fixes["b"].zone == "z5" and known(fixes["b"])
+
+
+def test_a_train_that_falls_silent_where_it_could_still_stop_has_not_left() -> None:
+    wayside = Wayside({"a": leaving()}, {"a": "z4"})
+    for time_s in times(12.0):
+        wayside.tick(time_s)
+    wayside.deaf = {"z5"}
+    for time_s in times(30.0, 12.0):
+        fix = wayside.tick(time_s)["a"]
+    assert not known(fix) and fix.reason == "not received in z5"

@@ -600,3 +600,17 @@ def test_headway_closes_to_the_analytic_minimum(delay_s: float, half_m: float) -
                 assert distance_m == pytest.approx(expected_m, abs=1e-6)
     # The leader has stopped: the delays do not count any more.
     assert leader_m - follower_m == pytest.approx(TRAIN_M + MARGIN_M + 2 * half_m, abs=1e-6)
+
+
+def test_for_a_train_that_leaves_the_track_does_not_end_and_for_others_it_does() -> None:
+    block = MovingBlock(
+        (TRACK,),
+        (start(1, 3000.0), start(2, 1000.0)),
+        margin_m=MARGIN_M,
+        end_margin_m=END_MARGIN_M,
+        leaving=(1,),
+    )
+    assert given_to(block, 1, 0.0).end_m > LENGTH_M + 1000.0
+    assert given_to(block, 2, 0.0).end_m < 3000.0 - TRAIN_M
+    block.remove(1)
+    assert given_to(block, 2, 1.0).end_m == LENGTH_M - END_MARGIN_M

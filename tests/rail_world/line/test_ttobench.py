@@ -263,3 +263,10 @@ def test_file_too_large(tmp_path: Path) -> None:
     file.write_bytes(b" " * 10_000_001)
     with pytest.raises(WorldDataError, match="too large"):
         load_ttobench(file)
+
+
+def test_a_file_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+    plain = write(tmp_path / "plain.json", GOOD)
+    marked = tmp_path / "marked.json"
+    marked.write_bytes(b"\xef\xbb\xbf" + plain.read_bytes())
+    assert load_ttobench(marked).stops_m == load_ttobench(plain).stops_m

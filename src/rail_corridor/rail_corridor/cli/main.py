@@ -365,6 +365,7 @@ add_figures(app)
 def main() -> None:
     """Entry point: every wrong input is one line and exit code 2."""
     from rail_corridor.errors import InputError
+    from rail_msgs_py.parameters import ParameterError
 
     # Typer brings its own command-line parser, or uses click: its errors are known by name.
     usage_errors: Any = next(
@@ -373,7 +374,7 @@ def main() -> None:
 
     try:
         code = app(standalone_mode=False)
-    except (InputError, UsageError) as error:
+    except (InputError, ParameterError, UsageError) as error:
         sys.exit(_refuse(str(error)))
     except usage_errors as error:
         sys.exit(_refuse(" ".join(error.format_message().split())))

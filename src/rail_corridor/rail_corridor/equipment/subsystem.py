@@ -26,13 +26,16 @@ from .run_figures import RunFigures
 class Supervision:
     """What trains obey.
 
-    Node on board that commands them, whether drivers see what it permits, and the standard
-    deviation of the error of the wheels it counts by.
+    Node on board that commands them, whether drivers see what it permits, the standard deviation
+    of the error of the wheels it counts by; within which way of one that stands a train stands
+    behind it; and whether it tells speed restrictions, so that there are no boards on the line.
     """
 
     node: str
     cab_signals: bool
     odometer_error: float
+    queue_m: float = 200.0
+    tells_restrictions: bool = False
 
 
 @dataclass(frozen=True)
@@ -173,6 +176,10 @@ class Subsystem:
     def run_report(self, scenario: Scenario, data: RunData) -> dict[str, Any]:
         """Sections of the report of the whole run."""
         return {}
+
+    def events(self, scenario: Scenario, data: RunData) -> Iterable[dict[str, Any]]:
+        """What went wrong by the truth: ``time_s, kind, train, track, at_m, message`` each."""
+        return ()
 
     def tables(self, report: Mapping[str, Any]) -> Iterable[RenderableType]:
         """What the report shows of it on the screen."""

@@ -10,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rail_corridor.run_data import RunData
+from rail_corridor.scenario.faults import SpeedRestrictionFault
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.world import COMMAND, STATE
 from rail_signals.arrays import FloatArray
 
+#: A restriction that begins is judged after this time, which trains near it need to brake [s].
+NOTICE_S = 30.0
 #: Speed above the limit that counts as overspeed [m/s].
 OVERSPEED_MPS = 0.5
 
@@ -25,7 +28,7 @@ def supervision_metrics(
     mine = recording[STATE].upto(recording.ticks)[:, index]
     command = recording[COMMAND].upto(recording.ticks)[:, index]
     speed_mps = np.abs(mine[:, STATE.index["speed_mps"]])
-    limit_mps = _limits(scenario, recording, mine)
+    limit_mps = _limits(scenario, recording, mine, scenario.trains[index].vehicle.length_m)
     brakes = (command[:, COMMAND.index["service_brake"]] > 0.0) & on_line
     emergency = (command[:, COMMAND.index["emergency_brake"]] > 0.0) & on_line
     moving = speed_mps > 0.0
@@ -68,10 +71,23 @@ def rises(flags: NDArray[np.bool_]) -> int:
     return int(np.count_nonzero(flags[1:] & ~flags[:-1]) + (flags.size > 0 and flags[0]))
 
 
-def _limits(scenario: Scenario, recording: RunData, mine: FloatArray) -> FloatArray:
+def _limits(
+    scenario: Scenario, recording: RunData, mine: FloatArray, length_m: float
+) -> FloatArray:
+    """Limit [m/s] at the front of a train in each tick; of a restriction under all of it."""
     limits = np.full(len(mine), np.inf)
     for track, name in enumerate(recording.tracks):
         there = mine[:, STATE.index["track_index"]] == track
         chainage_m = mine[there, STATE.index["chainage_m"]]
         limits[there] = scenario.network.tracks[name].limit_mps(chainage_m)
+    time_s = np.arange(len(mine)) * scenario.tick_s
+    chainage_m = mine[:, STATE.index["chainage_m"]]
+    for fault in scenario.faults:
+        if not isinstance(fault, SpeedRestrictionFault):
+            continue
+        track = recording.tracks.index(fault.track)
+        there = mine[:, STATE.index["track_index"]] == track
+        there &= (chainage_m >= fault.from_m) & (chainage_m < fault.to_m + length_m)
+        there &= (time_s >= fault.from_s + NOTICE_S) & (time_s < fault.to_s)
+        limits[there] = np.minimum(limits[there], fault.speed_kmh / 3.6)
     return limits

@@ -11,6 +11,7 @@ from rail_corridor.scenario.model import Scenario
 from rail_corridor.yaml_file import load_yaml
 
 from .loader import builtin_scenarios
+from .start_checks import climbing_troubles
 
 _MOST_TRAINS_SHOWN: Final = 24
 
@@ -35,6 +36,8 @@ def print_summary(scenario: Scenario, console: Console) -> None:
         )
     if len(scenario.trains) > _MOST_TRAINS_SHOWN:
         console.print(f"... and {len(scenario.trains) - _MOST_TRAINS_SHOWN} more trains")
+    for trouble in climbing_troubles(scenario):
+        console.print(f"[yellow]warning[/yellow]: {trouble}", soft_wrap=True, highlight=False)
     console.print(f"{scenario.ticks} ticks of {scenario.tick_s:g} s, seed {scenario.seed}")
 
 

@@ -18,7 +18,7 @@ from rail_corridor.equipment.registry import (
     subsystems,
     supervision_of,
 )
-from rail_corridor.equipment.subsystem import PlanContext
+from rail_corridor.equipment.subsystem import PlanContext, Supervision
 from rail_corridor.errors import InputError, did_you_mean
 from rail_corridor.run_data import RecordSpec, RunData, in_one_message
 from rail_corridor.scenario.model import Scenario
@@ -172,6 +172,7 @@ def make_plan(
         "odometers": () if odometer_error_of(scenario) is None else trains,
         "supervision": supervision.node if supervision else "",
         "cab_signals": supervision is None or supervision.cab_signals,
+        "queue_m": supervision.queue_m if supervision else Supervision.queue_m,
         "observed": observed,
         "end_when_arrived": scenario.end_when_arrived,
         "timeout_s": timeout_s,

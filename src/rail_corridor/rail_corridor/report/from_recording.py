@@ -27,7 +27,7 @@ from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.message_definition import type_name
 
 from .intake import Intake, Reader
-from .report import make_report, print_report, write_report
+from .report import make_report, print_report, print_verdict, write_report
 
 REPORT = "report.json"
 
@@ -51,6 +51,7 @@ def show_report(path: Path, json_path: Path | None, console: Console) -> int:
     if json_path is not None:
         write_report(report, json_path)
         console.print(f"report written to {json_path}")
+    print_verdict(report, console)
     return 0
 
 

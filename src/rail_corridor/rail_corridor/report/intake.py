@@ -54,6 +54,21 @@ class Reader:
         return self.topic.name(**self.parts)
 
 
+def _event(time_s: float, status: DiagnosticStatus) -> dict[str, Any]:
+    """What a node said of its health; of an event of the world its kind and place as well."""
+    said: dict[str, Any] = {
+        "time_s": time_s,
+        "level": _LEVELS.get(status.level, "?"),
+        "name": status.name,
+        "message": status.message,
+    }
+    values = {pair.key: pair.value for pair in status.values}
+    if "kind" in values:
+        place = {key: values[key] for key in ("kind", "train", "other", "track") if key in values}
+        said |= place | {"at_m": float(values["at_m"])}
+    return said
+
+
 def names_read(plan: Plan) -> frozenset[str]:
     """Names of the topics that a report reads, other than those that are kept for it."""
     ports = (spec.topic.name(**parts) for spec in plan.records for _, parts, _ in spec.ports())
@@ -153,14 +168,8 @@ class Intake:
                 continue
             self._health[status.name] = (status.level, status.message)
             if len(self._events) < _MOST_EVENTS:
-                self._events.append(
-                    {
-                        "time_s": to_ns(message.header.stamp) * 1e-9,
-                        "level": _LEVELS.get(status.level, "?"),
-                        "name": status.name,
-                        "message": status.message,
-                    }
-                )
+                time_s = to_ns(message.header.stamp) * 1e-9
+                self._events.append(_event(time_s, status))
         self._standing.add(said)
 
     def _take_finished(self, message: Any) -> None:

@@ -15,6 +15,7 @@ from rail_corridor.plan.plan import Plan
 from rail_corridor.scenario.model import Scenario
 
 from .intake import Intake
+from .verdict import event_counts, verdict_of
 
 _MOST_EVENTS_SHOWN = 8
 _FILE_WIDTH = 140
@@ -47,7 +48,14 @@ def make_report(
         run |= subsystem.run_report(scenario, recording)
         for index, section in enumerate(trains.values()):
             section |= subsystem.train_report(scenario, recording, index)
-    return {
+    said = [e for e in intake.events if e["level"] != "ok" and e["time_s"] < end_s]
+    said += [
+        {"level": "error", "name": f"{subsystem.name}: {event['kind']}, {event['train']}"} | event
+        for subsystem in subsystems()
+        for event in subsystem.events(scenario, recording)
+    ]
+    events = sorted(said, key=lambda event: (event["time_s"], event["name"]))
+    report = {
         "scenario": plan.scenario,
         "seed": plan.seed,
         "ticks": ticks,
@@ -60,10 +68,13 @@ def make_report(
         "missing_ticks": recording.missing_ticks,
         "digest": recording.digest(),
         "failures": intake.failures,
-        "events": [e for e in intake.events if e["level"] != "ok" and e["time_s"] < end_s],
+        "events": events,
+        "event_counts": event_counts(events),
         **run,
         "trains": trains,
     }
+    verdict = verdict_of(report)
+    return report | {"verdict": verdict.word, "reasons": list(verdict.reasons)}
 
 
 def report_text(report: dict[str, Any]) -> str:
@@ -107,8 +118,19 @@ def print_report(report: dict[str, Any], console: Console) -> None:
     _print_events(report["events"], console)
 
 
+def print_verdict(report: dict[str, Any], console: Console) -> None:
+    """Say in one line whether the run was safe, unsafe or not live, and why."""
+    colour = {"safe": "green", "unsafe": "red", "not live": "yellow"}[report["verdict"]]
+    reasons = "; ".join(report["reasons"])
+    line = f"[bold {colour}]{report['verdict']}[/bold {colour}]" + (
+        f": {reasons}" if reasons else ""
+    )
+    console.print(line, soft_wrap=True, highlight=False)
+
+
 def _print_events(events: list[dict[str, Any]], console: Console) -> None:
-    for event in events[:_MOST_EVENTS_SHOWN]:
+    grave = sorted(events, key=lambda event: event["level"] != "error")[:_MOST_EVENTS_SHOWN]
+    for event in sorted(grave, key=lambda event: event["time_s"]):
         console.print(
             f"[yellow]{event['level']}[/yellow] {event['time_s']:8.1f} s  "
             f"{event['name']}: {event['message']}",

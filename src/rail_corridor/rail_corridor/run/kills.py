@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.errors import InputError, did_you_mean
@@ -88,6 +89,16 @@ def killed_nodes(kills: Iterable[Kill], processes: Iterable[Sequence[NodeSpec]])
     killed = {kill.node for kill in kills}
     groups = [{spec.name for spec in specs} for specs in processes]
     return killed.union(*(names for names in groups if names & killed))
+
+
+def unplanned_failures(
+    failures: Iterable[Mapping[str, Any]],
+    kills: Iterable[Kill],
+    processes: Iterable[Sequence[NodeSpec]],
+) -> list[str]:
+    """Full names of nodes that failed and were not meant to."""
+    killed = killed_nodes(kills, processes)
+    return [one["node"] for one in failures if one["node"] not in killed]
 
 
 class FaultInjector:

@@ -29,14 +29,21 @@ from rail_corridor.plan.plan import (
 from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
 from rail_corridor.report.intake import names_read
-from rail_corridor.report.report import make_report, print_report, report_text, write_report
+from rail_corridor.report.report import (
+    make_report,
+    print_report,
+    print_verdict,
+    report_text,
+    write_report,
+)
 from rail_corridor.scenario.model import Scenario
 
+from . import exit_codes
 from .external_traffic import FULL_NAME as EXTERNAL_TRAFFIC
 from .external_traffic import ExternalTrafficRecorder
 from .host import destroy_nodes, load_for_nodes, make_context, make_nodes, run_nodes
 from .kernels import compile_before_the_first_run
-from .kills import FaultInjector, check_kills, killed_nodes
+from .kills import FaultInjector, check_kills, unplanned_failures
 from .options import RecordOptions, RunOptions, check_recording, default_placement
 from .other_half import ELSEWHERE, OtherHalf
 from .parameter_services import ParameterServicesOnDemand
@@ -55,20 +62,10 @@ DRAIN_S = 20.0
 SETTLE_S = 0.3
 #: Wall time for the nodes of this process to leave, after a signal.
 LEAVE_S = 0.5
-#: Exit codes: the other half has ended first; nodes have failed.
-HALF_GONE, NODES_FAILED = 3, 4
 
 
 def run(scenario: Scenario, options: RunOptions, console: Console) -> int:
-    """Run a scenario to its end, or until interrupted.
-
-    Returns
-    -------
-    int
-        Exit code: 0, 1 if the world itself or the recorder failed, 3 if the other half of a split
-        corridor ended first, 4 if nodes failed that were not meant to, 128 + the number of the
-        signal that ended it.
-    """
+    """Run a scenario to its end, or until interrupted; 0 or one of `exit_codes`."""
     if options.record is not None:
         check_recording(options.record.path, options.only)
     discover_on("all" if options.only else "this")
@@ -380,20 +377,20 @@ class _LaunchedRun:
         if self._recording is not None and not self._recording_failed:
             self._console.print(f"recorded to {self._recording.describe()}")
         if self._world_failed or (self._recording_failed and not self._signal):
-            return 1
+            return exit_codes.FAILED
         if self._signal:
-            return 128 + self._signal
+            return exit_codes.SIGNAL + self._signal
         if self._other_half.gone:
-            return HALF_GONE
-        return NODES_FAILED if self._unplanned_failures() else 0
-
-    def _unplanned_failures(self) -> bool:
-        """Whether nodes failed that were not meant to; says so, unless that is allowed."""
-        if self._observer is None or self._options.allow_failures:
-            return False
-        killed = killed_nodes(self._options.kills, () if self._here else self._groups.values())
-        failed = [one["node"] for one in self._observer.failures if one["node"] not in killed]
+            return exit_codes.HALF_GONE
+        failed: list[str] = []
+        if self._observer is not None and not self._options.allow_failures:
+            groups = () if self._here else self._groups.values()
+            failed = unplanned_failures(self._observer.failures, self._options.kills, groups)
         if failed:
             line = f"not meant to fail: {', '.join(failed)} (--allow-failures for exit code 0)"
             self._console.print(f"[red]{line}[/red]", soft_wrap=True, highlight=False)
-        return bool(failed)
+        if report is not None:
+            print_verdict(report, self._console)
+            if report["verdict"] == "unsafe":
+                return exit_codes.UNSAFE
+        return exit_codes.NODES_FAILED if failed else 0

@@ -6,8 +6,15 @@ from typing import Final, Literal
 
 from pydantic import Field, model_validator
 
-from rail_msgs_py.quantities import FAULT_BEGIN, FAULT_END, SLIP_RATIO
-from rail_world.line.description_base import Description, Name, StrictFloat, field_of
+from rail_msgs_py.quantities import ADHESION, BRAKE_FACTOR, FAULT_BEGIN, FAULT_END, SLIP_RATIO
+from rail_world.line.description_base import (
+    Chainage,
+    Description,
+    Name,
+    Speed,
+    StrictFloat,
+    field_of,
+)
 
 
 class Fault(Description):
@@ -62,5 +69,49 @@ class WheelSlipFault(TimedFault):
     ratio: StrictFloat = field_of(SLIP_RATIO)
 
 
-#: Kinds that befall a corridor whatever equipment is in it.
-COMMON_FAULTS: Final[tuple[type[Fault], ...]] = (TrainStopFault, WheelSlipFault, EquipmentOffFault)
+class ReducedBrakingFault(TimedFault):
+    """Brakes that give a part of their force only: failed cars, worn pads, rain."""
+
+    kind: Literal["reduced_braking"]
+    train: Name = Field(description="the train")
+    service: StrictFloat = field_of(BRAKE_FACTOR)
+    emergency: StrictFloat = field_of(BRAKE_FACTOR)
+
+
+class LowAdhesionFault(TimedFault):
+    """Rails that bear little: wheels slide when braked and spin when pulled harder than that."""
+
+    kind: Literal["low_adhesion"]
+    train: Name = Field(description="the train")
+    adhesion: StrictFloat = field_of(ADHESION)
+
+
+class SpeedRestrictionFault(TimedFault):
+    """A lower limit on a stretch of a track for a time.
+
+    Drivers keep to it as boards on the line, unless supervision tells them.
+    """
+
+    kind: Literal["speed_restriction"]
+    track: Name = Field(description="the track")
+    from_m: Chainage = Field(description="where it begins [m]")
+    to_m: Chainage = Field(description="where it ends [m]")
+    speed_kmh: Speed = Field(description="limit [km/h]")
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> SpeedRestrictionFault:
+        if self.to_m <= self.from_m:
+            raise ValueError(f"to_m: must be after from_m, {self.from_m:g} m")
+        return self
+
+
+#: Faults of trains and of the line, which belong to no equipment.
+WORLD_FAULTS: Final[tuple[type[Fault], ...]] = (
+    TrainStopFault,
+    WheelSlipFault,
+    ReducedBrakingFault,
+    LowAdhesionFault,
+    SpeedRestrictionFault,
+)
+#: Those, and what befalls any node.
+COMMON_FAULTS: Final[tuple[type[Fault], ...]] = (*WORLD_FAULTS, EquipmentOffFault)

@@ -11,8 +11,8 @@ from rail_world.trains.description import TrainDescription
 
 from .section_fields import StrictInt
 
-CLEARING_TIME_S: Final = 30.0
-"""Time after which a departed train has left the place it departed from [s]."""
+#: Trains no closer than that [s]; one that finds its entrance taken waits.
+LEAST_HEADWAY_S: Final = 30.0
 
 
 class TrainTemplate(TrainDescription):
@@ -37,7 +37,7 @@ class Timetable(Description):
 
     count: StrictInt = Field(ge=1, le=100, description="number of trains")
     headway_s: StrictFloat = Field(
-        ge=CLEARING_TIME_S, le=1e5, description="time from one departure to the next [s]"
+        ge=LEAST_HEADWAY_S, le=1e5, description="time from one departure to the next [s]"
     )
     train: TrainTemplate = Field(description="the train; its depart_s is that of the first")
 

@@ -19,6 +19,8 @@ MAX_ACCELERATION_MPS2 = 2.0
 #: A train that had been lost is claimed to be known only after so long: what came back may be
 #: another one's signal, or two stations' on one channel.
 CONFIRMED_S = 1.5
+#: No train brakes harder.
+MOST_BRAKING_MPS2 = 1.5
 GATE_M = 12.0
 SIGMAS = 6.0
 MAX_SPEED_MPS = 160.0
@@ -57,6 +59,7 @@ class _TrackedTrain:
     zone: str
     chainage_m: float
     entered: bool = False
+    left: bool = False
     seen_s: float = 0.0
     regained_s: float = -math.inf
     speed_mps: float = 0.0
@@ -188,6 +191,8 @@ class ZoneTracker:
         for index, train in enumerate(self._trains):
             if index in owners:
                 self._follow(train, time_s, places[owners[index]])
+            elif self._has_left(train, time_s):
+                train.left = True
             fixes.append(self._fix(train, index in owners, shared, readings))
         return fixes
 
@@ -216,6 +221,8 @@ class ZoneTracker:
         candidates: list[TrainCandidate] = []
         due: set[str] = set()
         for index, train in enumerate(self._trains):
+            if train.left:
+                continue
             if train.entered:
                 misses = self._misses(train, time_s, places)
                 followed = time_s - train.seen_s <= FOLLOWED_S
@@ -308,7 +315,7 @@ class ZoneTracker:
         """Zones in which two trains were last seen, one of which is not received alone."""
         seen: dict[str, int] = {}
         for index, train in enumerate(self._trains):
-            if train.entered:
+            if train.entered and not train.left:
                 zone = places[owners[index]].zone if index in owners else train.zone
                 seen[zone] = seen.get(zone, 0) + 1
         return {zone for zone, count in seen.items() if count > 1}
@@ -335,6 +342,8 @@ class ZoneTracker:
                 return train.fix
         if not train.entered:
             reason = train.unknown if self._entering else "not identified since the restart"
+        elif train.left:
+            reason = f"has left the line past {train.zone}"
         elif train.zone in shared:
             reason = f"two trains in {train.zone}"
         elif (disturbed := self._disturbed_near(train)) is not None:
@@ -355,6 +364,19 @@ class ZoneTracker:
             math.inf,
             reason,
         )
+
+    def _has_left(self, train: _TrackedTrain, time_s: float) -> bool:
+        """Whether a train has run out of the last zone of its line, and is heard no more.
+
+        It must have been so near the end, and so fast, that it could not have stopped before.
+        """
+        if not train.entered or train.left or self._map.following[train.zone]:
+            return train.left
+        zone = self._map.zones[train.zone]
+        way_m = zone.end_m - train.chainage_m
+        v = train.speed_mps
+        stops_m = 0.5 * v * abs(v) / MOST_BRAKING_MPS2
+        return time_s - train.seen_s > FOLLOWED_S and way_m < stops_m
 
     def _beyond(self, zone: str) -> str:
         """Name the stations that should have taken over a train past the end of a zone."""

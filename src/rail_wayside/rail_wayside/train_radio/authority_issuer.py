@@ -22,6 +22,10 @@ from .train_bounds import Trouble
 
 #: By so much another train's signal, 30 dB below, moves a range without being noticed [m].
 _UNSEEN_M = 1.5
+#: No train brakes harder [m/s^2].
+_MOST_BRAKING_MPS2 = 1.5
+#: Who was past stopping before the border and has been silent for so long has left [s].
+_LEFT_S = 3.0
 _DOUBTFUL = frozenset({Trouble.RANGE, Trouble.RANGE_SEGMENT, Trouble.LEAP})
 
 
@@ -34,6 +38,8 @@ class _ConnectedTrain:
     base: str | None = None
     place: tuple[float, float, float] | None = None  # time, ranged then, half-width
     held: IssuedAuthority | None = None
+    #: Whether it can no longer stop before the place at which it leaves.
+    leaving: bool = False
 
 
 class AuthorityState(NamedTuple):
@@ -104,8 +110,12 @@ class AuthorityIssuer:
             return None
         sealed_s = time_ns / NANOSECONDS - opened.age_s
         self._block.report(slot, sealed_s, report)
-        if report.position_valid and report.front_m >= caller.leaves_at_m:
-            self._block.remove(slot)
+        if report.position_valid:
+            if report.front_m >= caller.leaves_at_m:
+                self._block.remove(slot)
+            stopping_m = 0.5 * report.speed_mps**2 / _MOST_BRAKING_MPS2
+            least_m = report.front_m - report.uncertainty_m
+            caller.leaving = least_m + stopping_m >= caller.leaves_at_m
         return AcceptedReport(sealed_s, report)
 
     def ranged(
@@ -125,6 +135,8 @@ class AuthorityIssuer:
         """Frames for every train, by base station, each with its slot."""
         out: dict[str, list[tuple[int, bytes]]] = {base: [] for base in self._bases}
         for number, caller in self._callers.items():
+            if caller.leaving and caller.channel.channel.silence_s(time_ns) > _LEFT_S:
+                self._block.remove(number)
             authority = self._block.authority(number, time_ns / NANOSECONDS)
             caller.held = authority
             if authority is None:

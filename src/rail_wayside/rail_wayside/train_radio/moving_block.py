@@ -22,8 +22,9 @@ All times are those of one clock; a difference of clocks is part of the uncertai
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from math import inf
+from typing import Final
 
 from rail_msgs_py.train_radio.movement_authority import FASTEST_MPS, FURTHEST_M, LONGEST_S
 from rail_msgs_py.train_radio.train_report import LocationReport
@@ -34,6 +35,9 @@ from .train_bounds import TrainBounds, TrainStart, Trouble
 from .train_order import TrainOrder, inverted
 
 __all__ = ["IssuedAuthority", "MovingBlock", "Segment", "TrainStart", "Trouble", "to_telegram"]
+
+#: How far authorities reach past the end of a track for trains that go on.
+BEYOND_M: Final = 2000.0
 
 
 class MovingBlock:
@@ -56,6 +60,8 @@ class MovingBlock:
         Of an authority.
     standing_mps : float
         A train that reports no more than that stands; what it still rolls, the margin covers.
+    leaving : collection of int
+        Numbers of the trains that go on to the next control area: for them the track does not end.
 
     Raises
     ------
@@ -85,6 +91,7 @@ class MovingBlock:
         sigmas: float = 6.0,
         validity_s: float = 4.0,
         standing_mps: float = 0.1,
+        leaving: Collection[int] = (),
     ) -> None:
         for name, value, most in (
             ("margin_m", margin_m, FURTHEST_M),
@@ -99,6 +106,7 @@ class MovingBlock:
         self._margin_m, self._end_margin_m = margin_m, end_margin_m
         self._overspeed_mps, self._sigmas = overspeed_mps, sigmas
         self._validity_s, self._standing_mps = validity_s, standing_mps
+        self._leaving = frozenset(leaving)
         self._train_orders: dict[int, TrainOrder] = {}
         for segment in segments:
             if segment.number in self._train_orders:
@@ -227,6 +235,8 @@ class MovingBlock:
         number, direction = bounds.start.segment, bounds.direction
         line = self._train_orders[number]
         end_m = line.end_m(direction) - self._end_margin_m
+        if train in self._leaving:
+            end_m += BEYOND_M
         cause = "end of the track"
         ahead = bounds.above if direction > 0 else bounds.below
         if ahead is not None:

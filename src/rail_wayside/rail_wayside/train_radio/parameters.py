@@ -101,17 +101,18 @@ def _authority_issuer(p: AuthorityParameters) -> AuthorityIssuer:
         TrainStart(number, name, length_m, 1, segment, start_m, p.placed_m)
         for number, name, length_m, segment, start_m in rows
     ]
+    leaves = {n: at for n, at in zip(p.train_numbers, p.leaves_at_m, strict=True) if at > 0.0}
     block = MovingBlock(
         segments,
         starts,
         margin_m=p.margin_m,
         end_margin_m=p.end_margin_m,
         validity_s=p.validity_s,
+        leaving=leaves,
     )
     clock = unit_clock_of(p)
     channels = {
         number: controller_end(EndSettings(secret, p.seed, number, p.tick_s, clock))
         for number, secret in zip(p.train_numbers, p.secrets, strict=True)
     }
-    leaves = {n: at for n, at in zip(p.train_numbers, p.leaves_at_m, strict=True) if at > 0.0}
     return AuthorityIssuer(block, channels, p.bases, leaves_at_m=leaves, fix_sigmas=p.fix_sigmas)

@@ -64,7 +64,7 @@ def _read_json(path: Path) -> object:
     file = str(path)
     try:
         size = path.stat().st_size
-        text = path.read_text(encoding="utf-8") if size <= _LARGEST_FILE else ""
+        text = path.read_text(encoding="utf-8-sig") if size <= _LARGEST_FILE else ""
     except OSError as error:
         reason = error.strerror or "cannot be read"
         raise WorldDataError("(file)", path.name, reason, file=file) from None

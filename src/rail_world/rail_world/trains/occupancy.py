@@ -69,8 +69,8 @@ class Occupant(NamedTuple):
 
     Parameters
     ----------
-    index : int
-        Of the train.
+    train : int
+        Its index.
     stretches : tuple of Stretch
     direction : {1, -1}
         It runs towards increasing or decreasing chainage.
@@ -78,7 +78,7 @@ class Occupant(NamedTuple):
         Magnitude.
     """
 
-    index: int
+    train: int
     stretches: tuple[Stretch, ...]
     direction: int
     speed_mps: float
@@ -86,7 +86,7 @@ class Occupant(NamedTuple):
 
 def overlaps(occupants: Sequence[Occupant]) -> Iterator[tuple[int, int, Stretch]]:
     """Pairs of trains that are in the same place, the lower index first, and the place."""
-    flat = sorted((stretch, one.index) for one in occupants for stretch in one.stretches)
+    flat = sorted((stretch, one.train) for one in occupants for stretch in one.stretches)
     for number, (stretch, index) in enumerate(flat):
         for other, other_index in flat[number + 1 :]:
             if other.track != stretch.track or other.low_m > stretch.high_m - _SHARED_M:
@@ -96,17 +96,18 @@ def overlaps(occupants: Sequence[Occupant]) -> Iterator[tuple[int, int, Stretch]
                 yield min(index, other_index), max(index, other_index), shared
 
 
-def free_ahead_m(
-    route: Route, front_m: float, direction: int, index: int, occupants: Sequence[Occupant]
-) -> float:
-    """Way from a front to the first other train on its route ahead, infinite if there is none.
+def next_ahead(
+    route: Route, front_m: float, direction: int, train: int, occupants: Sequence[Occupant]
+) -> tuple[float, int]:
+    """Way from a front to the first other train on its route ahead, and which it is.
 
-    To one that comes towards it, half the way: the other needs the other half.
+    To one that comes towards it, half the way: the other needs the other half. Infinite, and the
+    train itself, if there is none.
     """
-    nearest = inf
+    nearest = inf, train
     for leg in route.legs:
         for other in occupants:
-            if other.index == index:
+            if other.train == train:
                 continue
             for track, low, high in other.stretches:
                 if track != leg.track.name or low > leg.end_m:
@@ -117,5 +118,5 @@ def free_ahead_m(
                     continue
                 gap_m = max(0.0, direction * (near_m - front_m))
                 comes = other.direction != direction and other.speed_mps > 0.0
-                nearest = min(nearest, 0.5 * gap_m if comes else gap_m)
+                nearest = min(nearest, (0.5 * gap_m if comes else gap_m, other.train))
     return nearest

@@ -15,7 +15,7 @@ from .conditions import Conditions
 from .description import TrainDescription
 from .drive_command import DriveCommand
 from .motion import TrainMotion
-from .occupancy import Fouling, Occupant, free_ahead_m, overlaps
+from .occupancy import Fouling, Occupant, next_ahead, overlaps
 
 STEP_M = 0.25
 MOST_POINTS = 400_000
@@ -75,7 +75,7 @@ class Traffic:
             command = imposed.get(name)
             ahead_m, free = inf, True
             if command is not None and command.on_sight:
-                ahead_m = free_ahead_m(train.route, train.front_m, train.direction, index, there)
+                ahead_m, _ = self.next_ahead(index)
             if train.due and train.description.enters_at_departure:
                 free = self.in_the_way(index, there) is None
                 if free:  # nobody else enters there in this tick
@@ -85,6 +85,11 @@ class Traffic:
             train.step(command, may_depart=free, free_ahead_m=ahead_m)
         self.occupants = self._occupants()
 
+    def next_ahead(self, index: int) -> tuple[float, int]:
+        """Way to the next train ahead [m], and its index; infinite, and its own, without one."""
+        train = self.trains[index]
+        return next_ahead(train.route, train.front_m, train.direction, index, self.occupants)
+
     def in_the_way(self, index: int, occupants: Sequence[Occupant]) -> int | None:
         """Who is where a train is to enter, or within its braking distance; None if nobody is.
 
@@ -93,9 +98,9 @@ class Traffic:
         train = self.trains[index]
         first = self._occupant(index, train.description.speed_kmh / 3.6, ENTRANCE_MARGIN_M)
         for other in occupants:
-            moved = self._occupant(other.index, other.speed_mps)
-            if other.index != index and next(overlaps((first, moved)), None) is not None:
-                return other.index
+            moved = self._occupant(other.train, other.speed_mps)
+            if other.train != index and next(overlaps((first, moved)), None) is not None:
+                return other.train
         return None
 
     def _occupants(self) -> list[Occupant]:
@@ -103,13 +108,7 @@ class Traffic:
         return [self._occupant(index) for index in there if self._on_line(index)]
 
     def _occupant(self, index: int, speed_mps: float = 0.0, margin_m: float = 0.0) -> Occupant:
-        """Where a train is, with the way to a stand from a speed and a margin at both ends."""
-        train = self.trains[index]
-        way_m = 0.5 * speed_mps * speed_mps / train.planned_deceleration_mps2
-        low_m = train.low_m - margin_m - (way_m if train.direction < 0 else 0.0)
-        high_m = train.high_m + margin_m + (way_m if train.direction > 0 else 0.0)
-        stretches = tuple(self._fouling.stretches(train.route, low_m, high_m))
-        return Occupant(index, stretches, train.direction, abs(train.speed_mps))
+        return occupant(index, self.trains[index], self._fouling, speed_mps, margin_m)
 
     def travelled(self) -> dict[str, tuple[float, float]]:
         """Distance [m] and speed [m/s] of the rims of the wheels of each train."""
@@ -155,6 +154,21 @@ class Traffic:
         if description.enters_at_departure and train.state == "waiting":
             return 0.0
         return 0.0 if description.leaves_on_arrival and train.state == "arrived" else 1.0
+
+
+def occupant(
+    index: int,
+    train: TrainMotion,
+    fouling: Fouling,
+    speed_mps: float = 0.0,
+    margin_m: float = 0.0,
+) -> Occupant:
+    """Where a train is, with the way to a stand from a speed, and a margin at both ends."""
+    way_m = 0.5 * speed_mps * speed_mps / train.planned_deceleration_mps2
+    low_m = train.low_m - margin_m - (way_m if train.direction < 0 else 0.0)
+    high_m = train.high_m + margin_m + (way_m if train.direction > 0 else 0.0)
+    stretches = tuple(fouling.stretches(train.route, low_m, high_m))
+    return Occupant(index, stretches, train.direction, abs(train.speed_mps))
 
 
 class CentreLine:

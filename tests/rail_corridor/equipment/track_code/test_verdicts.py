@@ -136,3 +136,14 @@ def test_the_gap_is_to_the_rear_of_the_train_ahead(gap_m: float) -> None:
     run.moves("follower", 1000.0 - LENGTH_M - gap_m)
     assert run.train("follower")["atp"]["margin_min_m"] == pytest.approx(gap_m)
     assert run.train("leader")["atp"]["margin_min_m"] is None
+
+
+def test_a_block_that_is_entered_while_occupied_is_an_event() -> None:
+    way_m = np.repeat([100.0, 600.0, 1100.0, 1600.0], 3)
+    run = RunBuilder("follow_codes", 12).moves("follower", way_m)
+    run.moves("leader", way_m + 200.0)
+    report = run.report()
+    events = [event for event in report["events"] if event["train"] == "follower"]
+    assert [event["at_m"] for event in events] == [600.0, 1100.0, 1600.0]
+    assert {event["kind"] for event in events} == {"occupied block entered"}
+    assert report["event_counts"]["occupied_block_entered"] == 3

@@ -1,5 +1,7 @@
 """Zone controller's desk and train protection, joined by a wire instead of the radio."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
@@ -22,8 +24,13 @@ LENGTH_M = 100.0
 class Corridor:
     """Two trains on a track of 3 km, the first ahead; base station b1 alone is heard."""
 
-    def __init__(self, placed_m: float = 1.0) -> None:
-        starts_m = {1: 1000.0, 2: 600.0}
+    def __init__(
+        self,
+        placed_m: float = 1.0,
+        first_m: float = 1000.0,
+        leaves_at_m: Mapping[int, float] | None = None,
+    ) -> None:
+        starts_m = {1: first_m, 2: 600.0}
         block = MovingBlock(
             [Segment(0, "main", 3000.0, ((0.0, 20.0),))],
             [TrainStart(n, f"t{n}", LENGTH_M, 1, 0, m, placed_m) for n, m in starts_m.items()],
@@ -33,7 +40,8 @@ class Corridor:
             n: SafeChannel(SECRET, CONTROLLER, n, (FrameKind.LOCATION_REPORT,), draw)
             for n in starts_m
         }
-        self.desk = AuthorityIssuer(block, channels, ["b1", "b2"])
+        self.block = block
+        self.desk = AuthorityIssuer(block, channels, ["b1", "b2"], leaves_at_m=leaves_at_m)
         self.trains = {
             n: TrainProtection(
                 TrainIdentity(n, 0, start_m, placed_m, LENGTH_M),
@@ -47,14 +55,21 @@ class Corridor:
         self.down: dict[int, list[bytes]] = {}
         self.sent: dict[str, list[tuple[int, bytes]]] = {}
 
-    def step(self, deaf: tuple[int, ...] = ()) -> dict[int, str]:
-        """One tick of 250 ms with standing trains; reasons to brake."""
+    def step(
+        self,
+        deaf: tuple[int, ...] = (),
+        *,
+        silent: tuple[int, ...] = (),
+        speed_mps: float = 0.0,
+    ) -> dict[int, str]:
+        """One tick of 250 ms with trains that do not move, whatever speed they tell; reasons."""
         now_ns, self.tick = self.tick * TICK_NS, self.tick + 1
         reasons, up = {}, {}
         for n, train in self.trains.items():
             frames = [] if n in deaf else self.down.get(n, [])
             reasons[n] = train.tick(now_ns, 0.0, 0.0, frames).reason
-            up[n] = train.frame(now_ns, 0.0)
+            if n not in silent:
+                up[n] = train.frame(now_ns, speed_mps)
         for n, frame in up.items():
             self.desk.receive("b1", n, frame, now_ns)
         self.sent = self.desk.telegrams(now_ns)
@@ -158,3 +173,29 @@ def test_a_range_of_no_known_variance_moves_nothing() -> None:
     now_ns = (corridor.tick - 1) * TICK_NS
     assert corridor.trains[1].state_values(now_ns) == untold.trains[1].state_values(now_ns)
     assert not corridor.desk.troubles(1)
+
+
+@pytest.mark.parametrize(("speed_mps", "leaves"), [(20.0, True), (5.0, False)])
+def test_who_could_not_stop_before_it_left_and_is_silent_has_left(
+    speed_mps: float, leaves: bool
+) -> None:
+    # 20 m/s and 1.5 m/s^2 are 133 m, 5 m/s are 8 m; it is 50 m before the border.
+    corridor = Corridor(first_m=2950.0, leaves_at_m={1: 3000.0})
+    for _ in range(12):
+        corridor.step(speed_mps=speed_mps)
+    assert corridor.block.trains == (1, 2)
+    for _ in range(11):
+        corridor.step(silent=(1,), speed_mps=speed_mps)
+    assert corridor.block.trains == (1, 2)
+    for _ in range(4):
+        corridor.step(silent=(1,), speed_mps=speed_mps)
+    assert corridor.block.trains == ((2,) if leaves else (1, 2))
+
+
+def test_who_does_not_leave_is_kept_however_fast_he_was() -> None:
+    corridor = Corridor(first_m=2950.0)
+    for _ in range(12):
+        corridor.step(speed_mps=20.0)
+    for _ in range(40):
+        corridor.step(silent=(1,))
+    assert corridor.block.trains == (1, 2)

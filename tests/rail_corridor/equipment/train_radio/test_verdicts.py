@@ -256,3 +256,27 @@ def test_the_gap_to_the_rear_ahead_is_told_also_when_there_is_none(gap_m: float)
     away_m[[0, 1, 2]] = 50.0, 20.0, 10.0
     made = run().moves("first", AT_M).moves("second", rear_m - gap_m - away_m)
     assert made.train("second")["atp"]["margin_min_m"] == pytest.approx(gap_m)
+
+
+# Events ----------------------------------------------------------------------------------
+
+
+def test_an_end_that_is_passed_is_an_event_with_time_and_place() -> None:
+    way_m = AT_M + 0.25 * np.arange(TICKS)
+    made = run().moves("second", way_m, 1.0).believed("second", way_m, end_m=way_m[-5] + 1e-9)
+    report = made.report()
+    (event,) = report["events"]
+    assert (event["kind"], event["train"]) == ("end of authority passed", "second")
+    assert event["time_s"] == (TICKS - 4) * TICK_S
+    assert event["at_m"] == way_m[-4] and event["level"] == "error"
+    assert report["event_counts"]["end_of_authority_passed"] == 1
+    assert report["verdict"] == "unsafe"
+
+
+def test_a_place_outside_of_its_claim_is_an_event() -> None:
+    made = run().moves("second", AT_M, 0.0)
+    off_m = np.where(np.isin(np.arange(TICKS), (3, 4, 7)), 5.0, 0.0)
+    made.believed("second", AT_M + off_m, 1.0)
+    events = made.report()["events"]
+    assert [event["time_s"] for event in events] == [3 * TICK_S, 7 * TICK_S]
+    assert {event["kind"] for event in events} == {"position wrong"}

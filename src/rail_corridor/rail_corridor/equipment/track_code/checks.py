@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from rail_corridor.errors import InputError
 from rail_corridor.scenario.model import Scenario
+from rail_signals.track_code.scales import CodeScales
 
 from .placement import circuits_of
 from .section import TRACK_CIRCUITS, DeadTransmitter, Sanding
@@ -42,6 +43,15 @@ def check_codes(scenario: Scenario, train_fields: Sequence[str]) -> None:
             raise InputError(reason, field=f"{field}.direction", value=train.direction)
         if train.reverse_at:
             raise InputError(reason, field=f"{field}.reverse_at", value=len(train.reverse_at))
+    for circuit in circuits_of(scenario):
+        try:
+            CodeScales().gradient_index(circuit.gradient_permil)
+        except ValueError:
+            raise InputError(
+                f"is steeper than any code can tell, in {circuit.name}",
+                field=f"tracks.{circuit.track}.gradients",
+                value=circuit.gradient_permil,
+            ) from None
     _check_faults(scenario)
 
 

@@ -21,6 +21,7 @@ from .checks import check_codes
 from .nodes import code_nodes
 from .placement import circuits_of
 from .report import code_metrics, code_table
+from .run_events import code_events
 from .section import TRACK_CIRCUITS, DeadTransmitter, Sanding
 from .world import rails_of
 
@@ -74,7 +75,9 @@ class TrackCodeSubsystem(Subsystem):
         plan = TRACK_CIRCUITS.of(scenario)
         if plan is None:
             return None
-        return Supervision(_SUPERVISION, plan.cab_signals, plan.odometer_error)
+        # The block before an occupied one may be barred too.
+        queue_m = 200.0 + 2.0 * plan.length_m
+        return Supervision(_SUPERVISION, plan.cab_signals, plan.odometer_error, queue_m)
 
     def plan(self, scenario: Scenario, context: PlanContext) -> Sequence[NodeSpec]:
         """See `Subsystem.plan`."""
@@ -138,6 +141,10 @@ class TrackCodeSubsystem(Subsystem):
     def train_report(self, scenario: Scenario, data: RunData, train: int) -> dict[str, Any]:
         """See `Subsystem.train_report`."""
         return code_metrics(scenario, data, train) if self.present(scenario) else {}
+
+    def events(self, scenario: Scenario, data: RunData) -> Iterable[dict[str, Any]]:
+        """See `Subsystem.events`."""
+        return code_events(scenario, data) if self.present(scenario) else ()
 
     def tables(self, report: Mapping[str, Any]) -> Iterable[RenderableType]:
         """See `Subsystem.tables`."""

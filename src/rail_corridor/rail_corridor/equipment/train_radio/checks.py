@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 from rail_corridor.errors import InputError, did_you_mean
 from rail_corridor.scenario.model import Scenario
+from rail_signals.track_code.scales import LEAST_BRAKING_MPS2, deceleration_mps2
 from rail_signals.train_radio.slots import RadioSlots
 
 from .keys import pair_keys
-from .nodes import CONTROLLER, burst_format
+from .nodes import CONTROLLER, burst_format, steepest_fall_permil
 from .placement import bases_of
 from .section import CBTC, CbtcPlan, ClockError, DeadBaseStation, NetworkThreats
 
@@ -59,6 +60,7 @@ def check_cbtc(scenario: Scenario, train_fields: Sequence[str]) -> None:
                     field=f"{field}.vehicle.{name}",
                     value=getattr(train.vehicle, name),
                 )
+    _check_braking(scenario, plan)
     _check_signal(scenario, plan)
     _check_clocks(scenario)
     pair_keys(scenario)
@@ -73,6 +75,19 @@ def check_cbtc(scenario: Scenario, train_fields: Sequence[str]) -> None:
                 f"{loss.track} ends at {track.length_m:g} m",
                 field=f"cbtc.losses.{index}.to_m",
                 value=loss.to_m,
+            )
+
+
+def _check_braking(scenario: Scenario, plan: CbtcPlan) -> None:
+    """See that what is left of the guaranteed brake stops a train on the steepest fall."""
+    for name, track in scenario.network.tracks.items():
+        fall_permil = steepest_fall_permil(track)
+        left_mps2 = deceleration_mps2(plan.braking_mps2, -fall_permil)
+        if left_mps2 < LEAST_BRAKING_MPS2:
+            raise InputError(
+                f"does not stop a train on the fall of {fall_permil:g} per mille of {name}",
+                field="cbtc.braking_mps2",
+                value=plan.braking_mps2,
             )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
+from math import inf
 from typing import Any, Final
 
 from rail_corridor.equipment.node_spec import NodeSpec
@@ -181,16 +182,15 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
     if plan is None:
         return {}
     tracks = scenario.network.tracks
-    limits = {name: limit_steps(track) for name, track in tracks.items()}
+    fastest_mps = max(train.vehicle.max_speed_kmh for train in scenario.trains) / 3.6
+    limits = {name: limit_steps(track, fastest_mps) for name, track in tracks.items()}
     numbers = {train.name: number for number, train in enumerate(scenario.trains, start=1)}
     by_departure = sorted(scenario.trains, key=lambda train: train.depart_s)
-    # Where trains go on to the next control area, the track does not end for them.
-    beyond_m = _BEYOND_M if all(train.leaves_on_arrival for train in by_departure) else 0.0
     return {
         "bases": tuple(base.name for base in bases_of(scenario)),
         "backbone": bool(threats_of(scenario).periods),
         "segments": tuple(tracks),
-        "segment_lengths_m": tuple(track.length_m + beyond_m for track in tracks.values()),
+        "segment_lengths_m": tuple(track.length_m for track in tracks.values()),
         "limit_counts": tuple(len(steps) for steps in limits.values()),
         "limit_from_m": tuple(at for steps in limits.values() for at, _ in steps),
         "limits_mps": tuple(mps for steps in limits.values() for _, mps in steps),
@@ -216,7 +216,10 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def limit_steps(track: Track) -> list[tuple[float, float]]:
-    """Speed limits of a track [m, m/s], from 0 on."""
-    steps = track.limits_mps.part(0.0, track.length_m)
+def limit_steps(track: Track, fastest_mps: float) -> list[tuple[float, float]]:
+    """Speed limits of a track [m, m/s], from 0 on; where there is none, the fastest train's."""
+    steps = [
+        (at_m, fastest_mps if limit_mps == inf else limit_mps)
+        for at_m, limit_mps in track.limits_mps.part(0.0, track.length_m)
+    ]
     return [steps[0], *(after for before, after in pairwise(steps) if after[1] != before[1])]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +12,7 @@ from rich.table import Table
 
 from rail_corridor.equipment.supervision_report import supervision_metrics
 from rail_corridor.equipment.tables import new_table
+from rail_corridor.equipment.true_events import events_of
 from rail_corridor.run_data import RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, CBTC_LINKS, RADIO_LINK
@@ -43,14 +44,38 @@ def cbtc_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str
     )
     speed_mps = np.abs(mine[:, STATE.index["speed_mps"]])
     passed, withdrawn = _passed(scenario, index, on_line, front_m, speed_mps, end_m)
+    mislocated = _mislocated(on_line, front_m, atp)
     return {
         "cbtc": _link(scenario, on_line, atp, issued, radio, links)
         | report_metrics(scenario, recording, index)
         | _location(on_line, front_m, atp)
+        | {"mislocated": int(np.count_nonzero(mislocated))}
         | {"passed_s": _passed_s(scenario, index, mine, on_line)},
         "atp": supervision_metrics(scenario, recording, index, on_line)
-        | {"passed_authority": passed, "authority_withdrawn": withdrawn},
+        | {
+            "passed_authority": int(np.count_nonzero(passed)),
+            "authority_withdrawn": withdrawn,
+        },
     }
+
+
+def cbtc_events(scenario: Scenario, recording: RunData) -> Iterator[dict[str, Any]]:
+    """An event for each end of authority passed, and for each place believed in wrongly."""
+    state = recording[STATE].upto(recording.ticks)
+    for index in range(len(scenario.trains)):
+        mine = state[:, index]
+        atp = recording[ATP_STATE].upto(recording.ticks)[:, index]
+        on_line = mine[:, STATE.index["on_line"]] > 0.0
+        front_m = mine[:, STATE.index["chainage_m"]]
+        end_m = _held(
+            atp[:, ATP_STATE.index["end_of_authority_m"]], atp[:, ATP_STATE.index["accepted"]]
+        )
+        speed_mps = np.abs(mine[:, STATE.index["speed_mps"]])
+        passed, _ = _passed(scenario, index, on_line, front_m, speed_mps, end_m)
+        mislocated = _mislocated(on_line, front_m, atp)
+        run = scenario, recording, index
+        yield from events_of("end of authority passed", "passed its end of authority", passed, *run)
+        yield from events_of("position wrong", "is not where it claims to be", mislocated, *run)
 
 
 def _passed(
@@ -60,8 +85,8 @@ def _passed(
     front_m: FloatArray,
     speed_mps: FloatArray,
     end_m: FloatArray,
-) -> tuple[int, int]:
-    """Ticks in which a moving train was past its end, and authorities withdrawn.
+) -> tuple[NDArray[np.bool_], int]:
+    """Ticks [tick] in which a moving train was past its end, and authorities withdrawn.
 
     One is withdrawn if it is cut to where no brake can stop the train any more, as when the wayside
     finds reports and ranges in disagreement. So it is where protection holds none (NaN) any more,
@@ -72,7 +97,8 @@ def _passed(
     assert plan is not None
     none = np.isnan(end_m)
     end_m = np.where(none, -math.inf, end_m)
-    passed = withdrawn = 0
+    passed = np.zeros(len(on_line), dtype=bool)
+    withdrawn = 0
     excused = False
     stands_by_m = -math.inf
     for tick in np.flatnonzero(on_line).tolist():
@@ -88,7 +114,7 @@ def _passed(
         elif v == 0.0 or front_m[tick] <= end_m[tick] - stopping_m:
             excused = False
         braking = excused and front_m[tick] <= stands_by_m
-        passed += bool(v > 0.0 and front_m[tick] > end_m[tick] and not braking)
+        passed[tick] = v > 0.0 and front_m[tick] > end_m[tick] and not braking
     return passed, withdrawn
 
 
@@ -179,25 +205,30 @@ def _last(table: FloatArray, column: int) -> float:
 def _location(
     on_line: NDArray[np.bool_], front_m: FloatArray, atp: FloatArray
 ) -> dict[str, float | int | None]:
-    """Where the train believed to be, against the truth.
-
-    An infinite uncertainty claims nothing; what is no number at all is a false claim.
-    """
+    """Where the train believed to be, against the truth; an infinite uncertainty claims nothing."""
     error_m = np.abs(atp[:, ATP_STATE.index["front_m"]] - front_m)
     half_m = atp[:, ATP_STATE.index["uncertainty_m"]]
     heard = ~np.isnan(atp[:, ATP_STATE.index["accepted"]])
     claimed = on_line & heard & (half_m != math.inf)
     known = claimed & np.isfinite(error_m) & np.isfinite(half_m)
-    mislocated = int(np.count_nonzero(claimed & ~(error_m <= half_m)))
     if not known.any():
-        nothing = {"located": 0.0, "location_rmse_m": None, "uncertainty_m": None}
-        return nothing | {"mislocated": mislocated}
+        return {"located": 0.0, "location_rmse_m": None, "uncertainty_m": None}
     return {
         "located": float(np.count_nonzero(known) / np.count_nonzero(on_line)),
         "location_rmse_m": float(math.sqrt(np.mean(error_m[known] ** 2))),
         "uncertainty_m": float(np.median(half_m[known])),
-        "mislocated": mislocated,
     }
+
+
+def _mislocated(
+    on_line: NDArray[np.bool_], front_m: FloatArray, atp: FloatArray
+) -> NDArray[np.bool_]:
+    """Ticks [tick] in which the truth is outside of the claim; no number is a false claim."""
+    error_m = np.abs(atp[:, ATP_STATE.index["front_m"]] - front_m)
+    half_m = atp[:, ATP_STATE.index["uncertainty_m"]]
+    heard = ~np.isnan(atp[:, ATP_STATE.index["accepted"]])
+    false: NDArray[np.bool_] = on_line & heard & (half_m != math.inf) & ~(error_m <= half_m)
+    return false
 
 
 def authority_table(trains: Mapping[str, Any]) -> Table | None:

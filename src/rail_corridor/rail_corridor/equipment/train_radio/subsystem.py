@@ -28,7 +28,7 @@ from rail_world.line.description_base import Description
 from .checks import check_cbtc
 from .nodes import burst_format, cbtc_nodes, controller_parameters, radio_parameters
 from .placement import bases_of
-from .report import authority_table, cbtc_metrics
+from .report import authority_table, cbtc_events, cbtc_metrics
 from .section import CBTC, ClockError, DeadBaseStation, NetworkThreats
 from .threat_metrics import threat_line, threat_metrics
 from .world import cbtc_description, threats_of
@@ -88,7 +88,15 @@ class TrainRadioSubsystem(Subsystem):
     def supervision(self, scenario: Scenario) -> Supervision | None:
         """See `Subsystem.supervision`."""
         plan = CBTC.of(scenario)
-        return None if plan is None else Supervision("atp", plan.cab_signals, plan.odometer_error)
+        if plan is None:
+            return None
+        return Supervision(
+            "atp",
+            plan.cab_signals,
+            plan.odometer_error,
+            queue_m=200.0 + plan.margin_m,
+            tells_restrictions=True,
+        )
 
     def plan(self, scenario: Scenario, context: PlanContext) -> Sequence[NodeSpec]:
         """See `Subsystem.plan`."""
@@ -153,6 +161,10 @@ class TrainRadioSubsystem(Subsystem):
     def run_report(self, scenario: Scenario, data: RunData) -> dict[str, Any]:
         """See `Subsystem.run_report`."""
         return {"threats": threat_metrics(data)} if STRIKES in data else {}
+
+    def events(self, scenario: Scenario, data: RunData) -> Iterable[dict[str, Any]]:
+        """See `Subsystem.events`."""
+        return cbtc_events(scenario, data) if self.present(scenario) else ()
 
     def tables(self, report: Mapping[str, Any]) -> Iterable[RenderableType]:
         """See `Subsystem.tables`."""

@@ -49,7 +49,7 @@ BUS_LINK: Final = Topic(
     ESTIMATE,
     Table,
     "bus_terminal",
-    "people, the report",
+    "atp, people, the report",
     "Counts of frames and bits after the tick, the measured margin, and at the head whether the "
     "end of the train is confirmed.",
     table=(

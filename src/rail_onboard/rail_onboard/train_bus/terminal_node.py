@@ -41,6 +41,9 @@ class BusTerminalParameters:
     )
     answer_timeout_s: float = quantities.ANSWER_TIMEOUT.parameter()
     medium: str = parameter("/world/bus_medium", "full name of the node that carries the frames")
+    protected: bool = parameter(
+        False, "whether train protection waits to hear that the train is whole"
+    )
     tick_s: float = TICK.parameter()
     timeout_s: float = GIVE_UP.parameter()
 
@@ -69,7 +72,7 @@ class BusTerminalNode(EquipmentNode[BusTerminalParameters], name="bus_head", nam
         # What was received in a tick is answered in the next.
         self._answer = self.inputs.internal_port("bus", p.medium, delay_ns=self._tick_ns)
         self._send = self.stream_out(BUS_TX, train=train, end=p.end)
-        self._link = self.table_out(BUS_LINK, (train,), train=train, end=p.end)
+        self._link = self.table_out(BUS_LINK, (train,), awaited=p.protected, train=train, end=p.end)
         self.blocks_in(BUS_RX, block, self._on_block, train=train, end=p.end)
         self.inputs.clock()
 

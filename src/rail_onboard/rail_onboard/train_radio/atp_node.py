@@ -1,7 +1,8 @@
 """Automatic train protection: obeys movement authorities received by radio, reports the train.
 
 Topics in: ``/<train>/cbtc_radio/telegrams``, ``/<train>/odometer``, with a localizer its
-``state``. Topics out: ``command``, ``telegrams``, ``state``, ``relayed_range``.
+``state``, with a train bus the ``link`` of its head. Topics out: ``command``, ``telegrams``,
+``state``, ``relayed_range``.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ from rail_msgs_py.quantities import (
     TRAIN_LENGTH,
     TRAIN_START,
 )
+from rail_msgs_py.stamps import NANOSECONDS
 from rail_msgs_py.tick_node import EquipmentNode
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE, RELAYED_RANGE
+from rail_msgs_py.topics.train_bus import BUS_LINK
 from rail_msgs_py.topics.train_radio import ATP_STATE, RADIO_TELEGRAMS, TRAIN_TELEGRAMS
 from rail_msgs_py.topics.world import COMMAND, ODOMETER
 from rail_msgs_py.train_radio import quantities
@@ -94,6 +97,10 @@ class AtpParameters(ClockParameters):
     odometer_error: float = ALLOWED_ODOMETER_ERROR.parameter()
     authority_timeout_s: float = quantities.AUTHORITY_TIMEOUT.parameter()
     localizer: bool = parameter(False, "whether the position is that of a localizer")
+    bus: bool = parameter(
+        False,
+        "whether the train bus confirms that the train is whole; else it is a fixed formation",
+    )
     secret: str = parameter("00" * 16, "its key with the zone controller, in hexadecimal digits")
     seed: int = SEED.parameter()
     tick_s: float = TICK.parameter()
@@ -148,6 +155,11 @@ def protection_of(p: AtpParameters) -> TrainProtection:
     return TrainProtection(identity, channel, location, modes)
 
 
+def _confirms_end(link: list[float] | None) -> bool:
+    """Whether the terminal at the head has heard the end of the train within its time-out."""
+    return link is not None and link[BUS_LINK.index["other_end"]] > 0.0
+
+
 def _worst_brake(p: AtpParameters) -> tuple[float, float]:
     """Deceleration on the steepest fall, and the delay that the traction until then makes longer.
 
@@ -171,6 +183,11 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
             row = table_row(LOCALIZER_STATE)
             self._localizer = self.inputs.port(LOCALIZER_STATE, row, train=train)
             self._relay = self.table_out(RELAYED_RANGE, (train,), awaited=True, train=train)
+        self._bus = ""
+        if self._p.bus:
+            # What the end of the train says in a tick is known at the head after it.
+            late_ns, row = round(self._p.tick_s * NANOSECONDS), table_row(BUS_LINK)
+            self._bus = self.inputs.port(BUS_LINK, row, delay_ns=late_ns, train=train, end="head")
         self._odometer = self.inputs.trigger(ODOMETER, table_row(ODOMETER), train=train)
         self._command = self.table_out(
             COMMAND, (train,), awaited=True, train=train, supervision=self.get_name()
@@ -198,6 +215,7 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
             half_m = known.half_m + 0.5 * ahead_m
             place = Location(known.low_m + half_m, half_m, True)
             localizer = LocalizerView(place, believed_mps, fastest_mps)
+        protection.whole = not self._p.bus or _confirms_end(items.get(self._bus))
         out, sent = _OFF, []
         if self.switched_on:
             out = protection.tick(stamp_ns, distance_m, speed_mps, frames, localizer)

@@ -70,6 +70,8 @@ class TrainProtection:
         self._location, self._supervision = location, supervision
         self._begun = self._braked = False
         self._here, self._fastest_mps = NOWHERE, 0.0
+        #: Whether the train is confirmed to be whole; of a fixed formation it always is.
+        self.whole = True
         #: Ranged positions told in the tick: when sealed [s], position, half-width [m].
         self.relayed: list[tuple[float, float, float]] = []
 
@@ -173,7 +175,7 @@ class TrainProtection:
             min(self._fastest_mps, FASTEST_MPS),
             here.uncertainty_m if valid else WIDEST_M,
             train.length_m,
-            True,
+            self.whole,
             valid,
         )
         return self._channel.channel.seal(FrameKind.LOCATION_REPORT, report.to_bytes(), time_ns)

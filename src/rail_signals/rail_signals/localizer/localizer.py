@@ -72,6 +72,7 @@ class Localizer:
         self._wheels = SlipDetector(settings.odometer, shape)
         self._model = MeasurementModel(settings)
         self._station: Values = np.nan
+        self._silent_s = np.full(shape, np.inf)
         self._time_s = -inf
 
     @property
@@ -110,6 +111,7 @@ class Localizer:
         where = np.ones(self.bank.known.shape[:-1], dtype=np.bool_) if which is None else which
         self.bank.place(where, chainage_m, sigma_m, speed_mps, sigma_mps)
         self.monitor.forget(where)
+        self._silent_s = np.where(where, 0.0, self._silent_s)
 
     def tick(self, time_s: float, readings: TickMeasurements) -> Estimate:
         """Take what came since the tick before, and say what is known now.
@@ -140,7 +142,26 @@ class Localizer:
         self._take(readings)
         self.bank.lose()
         self.monitor.test(self.bank, step_s)
-        return self._levels.estimate(self.bank, self.monitor, step_s, self._wheels.most_mps[..., 0])
+        return self._levels.estimate(
+            *(self.bank, self.monitor, step_s),
+            self._wheels.most_mps[..., 0],
+            self._has_long_been_silent(step_s, readings),
+        )
+
+    def _has_long_been_silent(self, step_s: float, readings: TickMeasurements) -> BoolArray:
+        """Whether nothing but the wheels has been heard for long, of every run [...]."""
+        self._silent_s = self._silent_s + step_s
+        for reading in (readings.range, readings.doppler, readings.block):
+            if reading is None:
+                continue
+            if reading.present is True:
+                self._silent_s = np.zeros(self._shape)
+            else:
+                heard = np.broadcast_to(reading.present, (*self._shape, 1))[..., 0]
+                self._silent_s = np.where(heard, 0.0, self._silent_s)
+        claim = self._settings.claim
+        silent: BoolArray = self._silent_s > max(claim.silent_s, 3.0 * claim.tick_s)
+        return silent
 
     def _take(self, readings: TickMeasurements) -> None:
         model = self._model

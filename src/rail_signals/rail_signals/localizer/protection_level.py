@@ -175,7 +175,7 @@ class ProtectionLevels:
     **A hypothesis that makes the interval too wide is no help.** Without sensor i the train may be
     known so badly that the hull is wider than any that is given, as after a long way on wheels
     that spun. The others hold it nevertheless, unless i is faulty: i is then uncovered, as where
-    the filter without it is lost.
+    the filter without it is lost. Where nothing but the wheels is heard, theirs is lost at once.
 
     **The fastest speed.** Without the wheels a speed is that of ranges, and some metres per second
     uncertain at a stand as well. Nothing else that a train has can tell whether wheels have begun
@@ -208,6 +208,7 @@ class ProtectionLevels:
         monitor: IntegrityMonitor,
         step_s: float,
         wheels_mps: Values = np.inf,
+        silent: bool | BoolArray = False,
     ) -> Estimate:
         """What may be claimed at the end of a tick.
 
@@ -219,6 +220,8 @@ class ProtectionLevels:
             Since the tick before.
         wheels_mps : float or float64 [...]
             Fastest speed by the wheels, as of `SlipDetector`; infinite where they do not tell.
+        silent : bool or bool [...]
+            Whether nothing but the wheels has been heard for long.
         """
         at = bank.x[: V + 1, ..., :HYPOTHESES]
         sigma = np.sqrt(bank.variances[: V + 1, ..., :HYPOTHESES])
@@ -228,7 +231,7 @@ class ProtectionLevels:
         if monitor.quiet and bank.known[..., :HYPOTHESES].all():
             lowest, highest = low.min(axis=-1), high.max(axis=-1)
             # So narrow that each of the intervals is, and the hull about any middle.
-            if (highest[S] - lowest[S]).max() <= self._claim.widest_m:
+            if (highest[S] - lowest[S]).max() <= self._claim.widest_m and not np.any(silent):
                 self._unmonitored_s.fill(0.0)
                 doubted = np.isinf(wheels_mps)
                 fastest = np.where(doubted, _fastest(lowest[V], highest[V]), wheels_mps)
@@ -240,6 +243,7 @@ class ProtectionLevels:
         healthy = possible[..., 0]
         reach = np.maximum(high[S] - middle[S][..., None], middle[S][..., None] - low[S])
         covered &= ~((healthy & covered[..., 0])[..., None] & (reach > self._claim.widest_m))
+        covered[..., _WHEELS] &= ~(healthy & silent)
         excluded = monitor.excluded.sum(axis=-1)
         # One sensor is faulty at most: once it is excluded, none of the others is.
         considered = possible & ((excluded == 0)[..., None] | (np.arange(HYPOTHESES) == 0))

@@ -188,6 +188,9 @@ class IntegrityClaim:
         From tick to tick, to divide the alarms among the ticks.
     widest_m : float
         A protection level above it is not given.
+    silent_s : float
+        After so long, or three ticks, without a reading but of wheels there is no position without
+        them: their fault is not covered.
     hold_s : float
         For how long a hypothesis that was refuted stays so.
     return_s : float
@@ -213,6 +216,7 @@ class IntegrityClaim:
     false_alarms_per_hour: float = 1e-3
     tick_s: float = 0.1
     widest_m: float = 200.0
+    silent_s: float = 0.75
     hold_s: float = 5.0
     return_s: float = 20.0
     agreement: float = 4.0

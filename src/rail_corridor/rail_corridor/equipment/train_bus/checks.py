@@ -12,14 +12,16 @@ from rail_signals.train_bus.profile import bus_profile_names
 from rail_signals.train_bus.train import train_consist
 
 from .nodes import most_traces
-from .section import TRAIN_BUS_SECTION, BusFault, BusPlan
+from .section import TRAIN_BUS_SECTION, BusFault, BusPlan, TrainPartedFault
 from .world import bus_trains
 
 
 def check_bus(scenario: Scenario) -> None:
     """Raise InputError for the first thing that does not fit the train bus."""
     plan = TRAIN_BUS_SECTION.of(scenario)
-    faults = [(i, f) for i, f in enumerate(scenario.faults) if isinstance(f, BusFault)]
+    faults = [
+        (i, f) for i, f in enumerate(scenario.faults) if isinstance(f, BusFault | TrainPartedFault)
+    ]
     if plan is None:
         for index, fault in faults:
             raise InputError(
@@ -41,7 +43,15 @@ def check_bus(scenario: Scenario) -> None:
     _check_frames(scenario, plan)
     seen: set[str] = set()
     for index, fault in faults:
-        _check_fault(scenario, plan, fault, f"faults.{index}")
+        _check_train(scenario, fault.train, f"faults.{index}")
+        if isinstance(fault, BusFault):
+            _check_fault(plan, fault, f"faults.{index}")
+        elif fault.behind_car >= len(plan.cars):
+            raise InputError(
+                f"is the last: the train has {len(plan.cars)} cars",
+                field=f"faults.{index}.behind_car",
+                value=fault.behind_car,
+            )
         if fault.train in seen:
             raise InputError(
                 "its bus has another fault already",
@@ -81,14 +91,17 @@ def _check_frames(scenario: Scenario, plan: BusPlan) -> None:
         )
 
 
-def _check_fault(scenario: Scenario, plan: BusPlan, fault: BusFault, field: str) -> None:
+def _check_train(scenario: Scenario, train: str, field: str) -> None:
     trains = bus_trains(scenario)
-    if fault.train not in trains:
+    if train not in trains:
         raise InputError(
             f"no such train has a bus, these have: {', '.join(trains)}",
             field=f"{field}.train",
-            value=fault.train,
+            value=train,
         )
+
+
+def _check_fault(plan: BusPlan, fault: BusFault, field: str) -> None:
     consist, cars = train_consist(plan.cars), len(plan.cars)
     if fault.car is not None and fault.car > cars:
         raise InputError(f"the train has {cars} cars", field=f"{field}.car", value=fault.car)

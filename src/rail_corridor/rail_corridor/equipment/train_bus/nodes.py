@@ -28,11 +28,18 @@ def bus_nodes(scenario: Scenario, context: PlanContext) -> list[NodeSpec]:
     for number, train in enumerate(trains):
         for end in ("head", "tail"):
             parameters = _terminal(scenario, plan, end, 3 * timeout_s / 5)
+            parameters["protected"] = end == "head" and _has_protection(scenario, context)
             nodes.append(NodeSpec("bus_terminal", f"/{train}/bus_{end}", "onboard", parameters))
         parameters = _monitor(scenario, plan, number / len(trains), 3 * timeout_s / 5)
         name = f"/{train}/train_bus_monitor"
         nodes.append(NodeSpec("train_bus_monitor", name, "onboard", parameters))
     return nodes
+
+
+def _has_protection(scenario: Scenario, context: PlanContext) -> bool:
+    """Whether trains have a protection that reports them."""
+    supervision = context.supervision(scenario)
+    return supervision is not None and supervision.node == "atp"
 
 
 def most_traces(plan: BusPlan) -> int:

@@ -120,6 +120,21 @@ class BusFault(Fault):
         return SIZES.get(self.fault, 1.0) if self.size is None else self.size
 
 
+class TrainPartedFault(Fault):
+    """A train that comes apart behind a car: the bus is cut there, and stays so.
+
+    The world has no rear part that stands by itself; what goes on as one train is still its whole
+    length. What is lost is the confirmation that the train is whole.
+    """
+
+    kind: Literal["train_parted"]
+    train: Name = Field(description="the train")
+    from_s: StrictFloat = field_of(FAULT_BEGIN)
+    behind_car: StrictInt = field_of(
+        quantities.FAULT_COUPLER.but(default=1, text="car behind which it parts")
+    )
+
+
 TRAIN_BUS_SECTION: Final[Section[BusPlan | None]] = Section(
     "train_bus", BusPlan | None, "the bus in the trains and what watches it; null = none", None
 )

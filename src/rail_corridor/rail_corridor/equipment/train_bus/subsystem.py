@@ -19,7 +19,7 @@ from rail_world.line.description_base import Description
 from .checks import check_bus
 from .nodes import bus_nodes
 from .report import bus_metrics, bus_table
-from .section import TRAIN_BUS_SECTION, BusFault
+from .section import TRAIN_BUS_SECTION, BusFault, TrainPartedFault
 from .world import bus_description, bus_trains
 
 _ONBOARD: Final = "rail_onboard.train_bus"
@@ -30,7 +30,7 @@ class TrainBusSubsystem(Subsystem):
 
     name = "train_bus"
     sections = (TRAIN_BUS_SECTION,)
-    faults = (BusFault,)
+    faults = (BusFault, TrainPartedFault)
     hazards = ("trains.*.train_bus.false_reports",)
     nodes = (
         NodeKind(
@@ -59,6 +59,10 @@ class TrainBusSubsystem(Subsystem):
     def plan(self, scenario: Scenario, context: PlanContext) -> Sequence[NodeSpec]:
         """See `Subsystem.plan`."""
         return bus_nodes(scenario, context)
+
+    def offer(self, kind: str, scenario: Scenario, train: str) -> Mapping[str, Any]:
+        """Train protection learns that the bus tells whether the train is whole."""
+        return {"bus": True} if kind == "atp" and train in bus_trains(scenario) else {}
 
     def world(self, scenario: Scenario) -> Mapping[str, Description]:
         """See `Subsystem.world`."""

@@ -9,7 +9,7 @@ from rail_signals.train_bus.consist import Consist
 from rail_signals.train_bus.train import train_consist
 from rail_world.train_bus.description import BusDescription, BusFaultDescription, TrainBus
 
-from .section import TRAIN_BUS_SECTION, BusFault, BusPlan
+from .section import TRAIN_BUS_SECTION, BusFault, BusPlan, TrainPartedFault
 
 #: Beyond the delay as drawn: tolerances, and what dispersion adds.
 _DELAY_FRACTION: Final = 1.2
@@ -27,8 +27,24 @@ def bus_trains(scenario: Scenario) -> tuple[str, ...]:
 
 def bus_fault_of(scenario: Scenario, train: str) -> BusFault | None:
     """The fault in the bus of a train, None if it stays healthy."""
-    faults = [f for f in scenario.faults if isinstance(f, BusFault) and f.train == train]
-    return faults[0] if faults else None
+    for fault in scenario.faults:
+        if isinstance(fault, BusFault | TrainPartedFault) and fault.train == train:
+            return fault if isinstance(fault, BusFault) else cut_of(scenario, fault)
+    return None
+
+
+def cut_of(scenario: Scenario, fault: TrainPartedFault) -> BusFault:
+    """The cut through the bus where a train parts."""
+    plan = TRAIN_BUS_SECTION.of(scenario)
+    assert plan is not None
+    return BusFault(
+        kind="bus_fault",
+        train=fault.train,
+        fault="open",
+        from_s=fault.from_s,
+        to_s=fault.from_s + 1.0,
+        at_m=float(bus_consist(plan).starts_m[fault.behind_car]),
+    )
 
 
 def bus_consist(plan: BusPlan) -> Consist:

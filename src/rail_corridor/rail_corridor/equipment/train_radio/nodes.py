@@ -28,8 +28,6 @@ from .world import threats_of
 
 CBTC_MEDIUM: Final = "/world/cbtc_medium"
 CONTROLLER: Final = "/wayside/zone_controller"
-#: How far authorities reach past the end of a track whose trains go on.
-_BEYOND_M: Final = 2000.0
 #: No vehicle exceeds its highest speed by more.
 _OVERSPEED_MPS: Final = 3.0
 #: Resistance of the sharpest curve of the line model, force over weight.

@@ -136,6 +136,20 @@ class Protection:
             self.hears()
         assert self.controller.established
 
+    def run_up(self, speed_mps: float, end_m: float) -> None:
+        """Gather speed as a train can; the way is that of the next tick."""
+        shown_mps = 0.0
+        while shown_mps < speed_mps:
+            shown_mps = min(shown_mps + 0.2, speed_mps)
+            self.tick([self.authority(end_m)], speed_mps=shown_mps)
+            self.hears()
+
+    def locate(self, front_m: float) -> dict[str, float]:
+        """Tell it ranges for as long as it wants; the command then."""
+        for _ in range(6):
+            command = self.tick([self.authority(located=(front_m, 2.0))])
+        return command
+
 
 def test_it_is_released_by_an_authority_and_reports_its_place(graph: Any, given: Any) -> None:
     train = Protection(graph, given)
@@ -149,7 +163,7 @@ def test_it_is_released_by_an_authority_and_reports_its_place(graph: Any, given:
     assert 15.0 < run["permitted_mps"] <= 20.0
     state = last(train.state)
     assert (state["end_of_authority_m"], state["authority_age_s"]) == (2000.0, 0.0)
-    train.tick([train.authority(2000.0)], way_m=10.0, speed_mps=15.0)
+    train.tick([train.authority(2000.0)], way_m=10.0)
     report = train.hears()
     assert report is not None
     assert (report.train, report.direction, report.position_valid) == (1, 1, True)
@@ -205,7 +219,7 @@ def test_the_emergency_brake_acts_where_the_end_cannot_be_kept(graph: Any, given
     train.tick()
     train.hears()
     train.greet()
-    train.tick([train.authority(1300.0)])
+    train.run_up(5.0, 1300.0)
     assert train.tick([train.authority(1300.0)], way_m=20.0, speed_mps=5.0)["emergency_brake"] == 0
     assert train.tick([train.authority(1300.0)], way_m=90.0, speed_mps=5.0)["emergency_brake"] == 1
     passed = train.tick([train.authority(1300.0)], way_m=101.0, speed_mps=5.0)
@@ -245,13 +259,57 @@ def test_switched_off_it_brakes_and_on_again_it_knows_nothing(graph: Any, given:
     state = last(train.state)
     assert math.isnan(state["end_of_authority_m"]) and math.isinf(state["authority_age_s"])
     assert (state["accepted"], state["rejected"]) == (0.0, 1.0)
+    assert math.isnan(state["front_m"]) and state["mode"] == 0.0
     train.hears()
     train.greet()
-    assert train.tick([train.authority()])["service_brake"] == 0.0
+    # It has an authority, but moves only when it has been located.
+    assert train.tick([train.authority()])["service_brake"] == 1.0
+    report = train.hears()
+    assert report is not None and not report.position_valid
+    assert train.locate(1234.0)["service_brake"] == 0.0
+    state = last(train.state)
+    assert (state["front_m"], state["uncertainty_m"], state["mode"]) == (1234.0, 2.0, 1.0)
 
 
-def test_with_a_localizer_it_is_where_that_says_or_stops(graph: Any, given: Any) -> None:
+def test_a_person_lets_it_run_on_sight_until_it_is_located(graph: Any, given: Any) -> None:
+    train = Protection(graph, given, releases_s=(2.0, 4.0), on_sight_mps=4.0)
+    train.ticks = 4  # not the start of the run: it knows no place
+    train.tick()
+    train.hears()
+    train.greet()
+    assert train.ticks * TICK_S > 2.0
+    released = last(train.command)
+    assert (released["on_sight"], released["permitted_mps"]) == (1.0, 4.0)
+    assert released["service_brake"] == released["emergency_brake"] == 0.0
+    assert last(train.state)["mode"] == 3.0
+    report = train.hears()
+    assert report is None or report.on_sight
+    located = train.locate(1234.0)
+    assert (located["on_sight"], located["service_brake"]) == (0.0, 0.0)
+    # The second release finds a train under supervision, and is of no use later.
+    while train.ticks * TICK_S < 4.5:
+        train.tick([train.authority()])
+    for _ in range(16):
+        lost = train.tick()
+    assert (lost["on_sight"], lost["service_brake"]) == (0.0, 1.0)
+
+
+def test_too_fast_on_sight_it_brakes(graph: Any, given: Any) -> None:
+    train = Protection(graph, given, releases_s=(1.0,), on_sight_mps=2.0)
+    train.ticks = 4
+    assert train.tick()["on_sight"] == 1.0
+    shown = {}
+    for tick in range(1, 24):
+        shown[0.2 * tick] = train.tick(speed_mps=0.2 * tick)
+    assert all(not shown[v]["service_brake"] for v in shown if v <= 2.7)
+    over = [v for v in shown if v > 2.71]
+    assert all(shown[v]["service_brake"] and shown[v]["traction_cut_off"] for v in over)
+    assert all(shown[v]["emergency_brake"] == (v > 4.01) for v in shown)
+
+
+def test_with_a_localizer_it_is_where_that_says_or_where_ranges_say(graph: Any, given: Any) -> None:
     train = Protection(graph, given, localizer=True)
+    train.ticks = 4  # not the start of the run
     train.tick(place=(1250.0, 1254.0))
     train.hears()
     for _ in range(4):
@@ -263,12 +321,17 @@ def test_with_a_localizer_it_is_where_that_says_or_stops(graph: Any, given: Any)
     state = last(train.state)
     assert (state["front_m"], state["uncertainty_m"]) == (1252.0, 2.0)
     # What the wayside ranged goes on to the localizer, of the very time it was sealed.
-    graph.wait(lambda: len(train.told) >= train.ticks)
+    graph.wait(lambda: len(train.told) >= train.ticks - 4)
     assert list(last(train.told).values()) == pytest.approx([(train.ticks - 1) * TICK_S, *located])
     lost = train.tick([train.authority()], place=None)
     assert lost["service_brake"] == 1.0
     assert math.isnan(last(train.state)["front_m"])
+    # Ranges and odometer alone locate it too.
+    assert train.locate(1251.5)["service_brake"] == 0.0
+    state = last(train.state)
+    assert (state["front_m"], state["uncertainty_m"]) == (1251.5, 2.0)
     assert train.tick([train.authority()], place=(1250.0, 1254.0))["service_brake"] == 0.0
+    assert last(train.state)["front_m"] == 1252.0
 
 
 def test_an_emergency_stop_stops_a_train_with_track_ahead(graph: Any, given: Any) -> None:
@@ -276,6 +339,7 @@ def test_an_emergency_stop_stops_a_train_with_track_ahead(graph: Any, given: Any
     train.tick()
     train.hears()
     train.greet()
+    train.run_up(5.0, 2000.0)
     run = train.tick([train.authority(2000.0)], speed_mps=5.0)
     assert run["emergency_brake"] == 0.0
     stopped = train.tick([train.authority(2000.0, emergency_stop=True)], way_m=1.0, speed_mps=5.0)

@@ -232,6 +232,8 @@ class RunBuilder:
             uncertainty_m=half_m,
             end_of_authority_m=end_m,
             authority_age_s=age_s,
+            mode=0.0,
+            odometer_doubted=0.0,
         )
         return self
 

@@ -38,7 +38,13 @@ from rail_msgs_py.topics.train_radio import (
     UP_TELEGRAMS,
 )
 from rail_msgs_py.train_radio.telegrams import Telegrams, telegrams
-from rail_wayside.ranging.train_tracker import NO_READING, TrainFix, ZoneReading, ZoneTracker
+from rail_wayside.ranging.train_tracker import (
+    NO_READING,
+    Reported,
+    TrainFix,
+    ZoneReading,
+    ZoneTracker,
+)
 from rail_wayside.ranging.zone_map import MappedZone, ZoneMap
 from rail_wayside.train_radio.authority_issuer import AcceptedReport
 from rail_wayside.train_radio.parameters import AuthorityParameters, authority_issuer_of
@@ -127,8 +133,9 @@ class ZoneControllerNode(
 
     def start_over(self) -> None:
         """Have seen no train, and have spoken with none."""
-        self._tracker: ZoneTracker | None = None
-        self._issuer = authority_issuer_of(self._p)
+        p = self._p
+        self._tracker = ZoneTracker(self._map, list(zip(p.trains, p.entry_zones, strict=True)))
+        self._issuer = authority_issuer_of(p)
 
     def _open_radio(self) -> None:
         """Open the ports of all base stations."""
@@ -153,17 +160,38 @@ class ZoneControllerNode(
         if not self.switched_on:
             self._keep_silent(stamp_ns)
             return
-        if self._tracker is None:
-            # What was told of trains at the start of the run holds for its first tick alone.
-            due = list(zip(self._p.trains, self._p.entry_zones, strict=True))
-            self._tracker = ZoneTracker(self._map, due, entering=stamp_ns == 0)
         readings = {zone: items[port] for zone, port in self._zone_ports.items() if port in items}
-        fixes = self._tracker.update(stamp_ns * 1e-9, readings)
+        time_s, issuer = stamp_ns * 1e-9, self._issuer
+        fixes = self._tracker.update(time_s, readings, self._reported(time_s))
+        if issuer is not None and self._tracker.restarted:
+            issuer.sweep(time_s, self._clear(readings))
         for fix in fixes:
             self._publish(stamp_ns, fix)
-        self._authorise(stamp_ns, self._tracker, fixes, items)
-        self._report_zones(stamp_ns, self._tracker)
+        self._authorise(stamp_ns, fixes, items)
+        self._report_zones(stamp_ns)
         self._done(header_to_cdr(stamp_ns))
+
+    def _reported(self, time_s: float) -> dict[str, Reported]:
+        """Where trains are by radio, for a tracker that knows no train."""
+        if self._issuer is None:
+            return {}
+        names = {number: train for train, number in self._numbers.items()}
+        return {
+            names[number]: Reported(self._p.segments[segment], low_m, high_m)
+            for number, (segment, low_m, high_m) in self._issuer.whereabouts(time_s).items()
+        }
+
+    def _clear(self, readings: Mapping[str, ZoneReading]) -> dict[int, bool]:
+        """For each track whether all its zones were read, and every reading is a train's."""
+        doubtful = {*self._tracker.unidentified, *self._tracker.disturbed}
+        return {
+            number: all(
+                name in readings and name not in doubtful
+                for name, zone in self._map.zones.items()
+                if zone.track == track
+            )
+            for track, number in self._segments.items()
+        }
 
     def _keep_silent(self, stamp_ns: int) -> None:
         """Answer a tick in which it is switched off."""
@@ -181,11 +209,7 @@ class ZoneControllerNode(
         self._done(header_to_cdr(stamp_ns))
 
     def _authorise(
-        self,
-        stamp_ns: int,
-        tracker: ZoneTracker,
-        fixes: Iterable[TrainFix],
-        items: Mapping[str, Any],
+        self, stamp_ns: int, fixes: Iterable[TrainFix], items: Mapping[str, Any]
     ) -> None:
         """Take the trains' reports of a tick, and give authorities for the next one."""
         issuer = self._issuer
@@ -198,23 +222,22 @@ class ZoneControllerNode(
                     accepted.setdefault(slot, []).append(report)
         numbers = self._numbers
         for train, publish_reports in self._reports.items():
-            taken = accepted.get(numbers[train], ())
-            publish_reports(_reports(stamp_ns, taken))
-            for sealed_s, said in taken:
-                if said.position_valid and said.segment < len(self._p.segments):
-                    place = (said.front_m, said.uncertainty_m, said.speed_mps)
-                    tracker.identify(train, self._p.segments[said.segment], sealed_s, *place)
+            publish_reports(_reports(stamp_ns, accepted.get(numbers[train], ())))
         for fix in fixes:
             segment = self._segments.get(fix.track)
             if segment is not None:
                 place = (segment, fix.chainage_m, fix.variance_m2)
                 issuer.ranged(numbers[fix.train], stamp_ns * 1e-9, *place)
+        for train, number in numbers.items():
+            if number in issuer.gone:
+                self._tracker.leave(train)
         for base, frames in issuer.telegrams(stamp_ns).items():
             self._down[base](telegrams(stamp_ns, frames))
         for train, publish in self._authorities.items():
             values = np.array([issuer.authority_state(numbers[train], stamp_ns)], dtype=np.float64)
             publish(stamp_ns, values)
-            trouble = issuer.troubles(numbers[train])
+            waits = issuer.waits_for(numbers[train], stamp_ns * 1e-9)
+            trouble = waits or issuer.troubles(numbers[train])
             self.report(
                 DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK,
                 f"{train} authority",
@@ -239,8 +262,8 @@ class ZoneControllerNode(
         level = DiagnosticStatus.WARN if fix.reason else DiagnosticStatus.OK
         self.report(level, fix.train, fix.reason or "position known", stamp_ns=stamp_ns)
 
-    def _report_zones(self, stamp_ns: int, tracker: ZoneTracker) -> None:
-        unknown = ", ".join(tracker.unidentified)
+    def _report_zones(self, stamp_ns: int) -> None:
+        unknown = ", ".join(self._tracker.unidentified)
         self.report(
             DiagnosticStatus.WARN if unknown else DiagnosticStatus.OK,
             "train describer",

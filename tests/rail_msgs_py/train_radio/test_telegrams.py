@@ -202,8 +202,8 @@ def test_any_bytes_are_a_telegram_that_is_written_the_same_or_an_error(raw: byte
 
 def test_bits_that_mean_nothing_are_refused() -> None:
     raw = bytearray(REPORT.to_bytes())
-    raw[14] |= 8
-    with pytest.raises(ValueError, match="flags 0x0f"):
+    raw[14] |= 16
+    with pytest.raises(ValueError, match="flags 0x17"):
         LocationReport.from_bytes(bytes(raw))
     raw = bytearray(AUTHORITY.to_bytes())
     raw[-1] = 1

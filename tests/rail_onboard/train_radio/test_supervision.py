@@ -330,7 +330,8 @@ class Train:
     def locate(self) -> None:
         self.where.update(self.time_s, self.counted_m, self.measured_mps)
         if round(self.time_s / self.tick_s) % max(1, round(1.0 / self.tick_s)) == 0:
-            self.where.fix(self.time_s, self.direction * (self.s + self.off * 6.0), 6.0)
+            take = self.where.fix if self.where.location(self.time_s).valid else self.where.place
+            take(self.time_s, self.direction * (self.s + self.off * 6.0), 6.0)
 
     @property
     def measured_mps(self) -> float:

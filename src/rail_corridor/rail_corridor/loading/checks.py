@@ -79,6 +79,8 @@ def _check_actions(scenario: Scenario) -> None:
                 field=f"actions.{index}.train",
                 value=action.train,
             )
+
+
 def _check_restriction(scenario: Scenario, fault: SpeedRestrictionFault, field: str) -> None:
     track = scenario.network.tracks.get(fault.track)
     if track is None:

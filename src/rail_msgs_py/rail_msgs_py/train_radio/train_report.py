@@ -12,7 +12,8 @@ offset bytes field                                                          reso
 10     2     uncertainty                                                    0.1 m
 12     2     length                                                         0.1 m
 14     1     flags: 1 towards greater offsets, 2 integrity confirmed,
-             4 position valid; the others are zero
+             4 position valid, 8 released to run on sight; the others are
+             zero
 15     1     zero
 ====== ===== ============================================================== ==========
 
@@ -42,7 +43,8 @@ PER_MPS: Final = 100
 
 _LAYOUT = struct.Struct(">HHiHHHBx")
 REPORT_BYTES: Final = _LAYOUT.size
-_FORWARD, _INTEGRITY, _VALID = 1, 2, 4
+_FORWARD, _INTEGRITY, _VALID, _ON_SIGHT = 1, 2, 4, 8
+_FLAGS = _FORWARD | _INTEGRITY | _VALID | _ON_SIGHT
 _MOST = 0xFFFF
 
 
@@ -69,6 +71,8 @@ class LocationReport:
         Whether the train knows itself to be whole.
     position_valid : bool
         Whether segment, offset, direction and uncertainty mean anything.
+    on_sight : bool
+        Whether a person has released the train to run on sight: it may pass its authority.
 
     Raises
     ------
@@ -92,6 +96,7 @@ class LocationReport:
     length_m: float
     integrity_confirmed: bool
     position_valid: bool
+    on_sight: bool = False
 
     def __post_init__(self) -> None:
         """Check the ranges."""
@@ -130,7 +135,8 @@ class LocationReport:
             up(self.length_m, PER_METRE_COARSE),
             (_FORWARD if self.direction > 0 else 0)
             | (_INTEGRITY if self.integrity_confirmed else 0)
-            | (_VALID if valid else 0),
+            | (_VALID if valid else 0)
+            | (_ON_SIGHT if self.on_sight else 0),
         )
 
     @classmethod
@@ -145,7 +151,7 @@ class LocationReport:
         if len(raw) != REPORT_BYTES:
             raise ValueError(f"a location report has {REPORT_BYTES} bytes, got {len(raw)}")
         train, segment, offset, speed, uncertainty, length, flags = _LAYOUT.unpack(raw)
-        if flags > _FORWARD | _INTEGRITY | _VALID or raw[-1]:
+        if flags > _FLAGS or raw[-1]:
             raise ValueError(f"not a location report: flags {flags:#04x}, last byte {raw[-1]}")
         return cls(
             train,
@@ -157,4 +163,5 @@ class LocationReport:
             length / PER_METRE_COARSE,
             bool(flags & _INTEGRITY),
             bool(flags & _VALID),
+            bool(flags & _ON_SIGHT),
         )

@@ -50,6 +50,7 @@ from .train_protection import LocalizerView, TrainIdentity, TrainProtection
 _BUILD_UP_S = 1.0
 _NOT_RELAYED = (nan, nan, inf)
 _OFF = SupervisionOutput(0.0, True, True, True, "switched off")
+_NO_STATE = (nan, nan, nan, nan, inf, nan, inf, 0.0, 0.0)
 _MODES = {
     TrainMode.NOT_KNOWN: "position not known: held until it is located",
     TrainMode.LOCATED: "located, stands",
@@ -226,8 +227,8 @@ class AtpNode(EquipmentNode[AtpParameters], name="atp", namespace="/train_1"):
                 max(protection.relayed, default=_NOT_RELAYED) if self.switched_on else _NOT_RELAYED
             )
             self._relay(stamp_ns, np.array([newest]))
-        values = np.array([protection.state_values(stamp_ns)], dtype=np.float64)
-        self._state(stamp_ns, values)
+        state = protection.state_values(stamp_ns) if self.switched_on else _NO_STATE
+        self._state(stamp_ns, np.array([state], dtype=np.float64))
         # The driver keeps to it by his own speed, supervision judges the fastest it may be.
         permitted_mps = max(0.0, out.permitted_mps - doubt_mps)
         command = [permitted_mps, out.warning, out.service_brake, out.emergency_brake]

@@ -16,7 +16,9 @@ is bounded by physics from the greater and the smaller of the two readings on:
 
 So a train that is made to brake in doubt comes to a stand within the way that every train is given
 by the supervision, whatever its wheels show. The doubt ends where physics has brought the train to
-a stand, or where ranges have shown that the wheels count what the train runs.
+a stand, and it may start again; but the wheels may go on to slide then, without a step that tells.
+So they are **unproven**, and the bounds stay those of physics, until ranges have shown that they
+count what the train runs.
 
 A slide that begins so slowly that it could be braking is not seen here, nor is one of a train that
 hardly moves: for these there are the ranges (see ``train_location``).
@@ -93,7 +95,10 @@ class OdometerWatch:
 
     def reset(self) -> None:
         """Forget everything, as when switched on."""
+        #: Whether the train has to be braked because of its wheels.
         self.doubted = False
+        #: Whether place and speed are bounded by physics, doubted or not.
+        self.unproven = False
         #: Speed before and after the step of this reading; None if it showed none.
         self.stepped: tuple[float, float] | None = None
         self._speed_mps: float | None = None
@@ -104,7 +109,7 @@ class OdometerWatch:
     def fastest_mps(self) -> float:
         """The fastest that the train may run, by its wheels or, in doubt, by physics [m/s]."""
         shown = self._speed_mps or 0.0
-        return max(shown, self._high_mps) if self.doubted else shown
+        return max(shown, self._high_mps) if self.unproven else shown
 
     def step(
         self, elapsed_s: float, counted_m: float, speed_mps: float, braked: bool
@@ -128,7 +133,7 @@ class OdometerWatch:
         if self._impossible(before_mps, speed_mps, elapsed_s):
             self.stepped = before_mps, speed_mps
             self._widen(before_mps, speed_mps)
-        if not self.doubted:
+        if not self.unproven:
             return self._counted(counted_m)
         run_m = self._run(elapsed_s)
         if self._high_mps <= 0.0 and speed_mps <= STANDSTILL_MPS:
@@ -142,7 +147,11 @@ class OdometerWatch:
 
     def trust(self) -> None:
         """Believe the wheels again: ranges have shown that they count what the train runs."""
-        self.doubted = False
+        self.doubted = self.unproven = False
+
+    def bound(self, fastest_mps: float) -> None:
+        """Take note that ranges have shown that the train is no faster [m/s]."""
+        self._high_mps = min(self._high_mps, fastest_mps)
 
     def _counted(self, counted_m: float) -> tuple[float, float]:
         return (1.0 - self._error) * counted_m, (1.0 + self._error) * counted_m
@@ -159,9 +168,9 @@ class OdometerWatch:
         assert self._limits is not None
         low_mps = (1.0 - self._error) * min(one_mps, other_mps)
         high_mps = (1.0 + self._error) * max(one_mps, other_mps)
-        if self.doubted:
+        if self.unproven:
             low_mps, high_mps = min(low_mps, self._low_mps), max(high_mps, self._high_mps)
-        self.doubted = True
+        self.doubted = self.unproven = True
         self._low_mps, self._high_mps = low_mps, min(high_mps, self._limits.fastest_mps)
 
     def _run(self, elapsed_s: float) -> tuple[float, float]:
@@ -169,7 +178,7 @@ class OdometerWatch:
         assert self._limits is not None
         limits = self._limits
         most_mps = self._high_mps
-        if self._braked_s > limits.delay_s:
+        if self._braked_s > limits.delay_s or (most_mps <= 0.0 and self._braked_s > 0.0):
             self._high_mps = max(0.0, most_mps - limits.sure_braking_mps2 * elapsed_s)
         else:
             gained_mps = limits.accelerating_mps2 * elapsed_s

@@ -24,14 +24,16 @@ row agree with the odometer and with each other; a single one may be another tra
 
 **A range that contradicts** it is one of two that are wrong: the hull of both is taken. The next
 range that agrees with the old interval heals it. Ranges that go on to contradict it, and agree with
-each other, are believed alone in the end: after ``DOUBTED`` of them if the odometer has been in
-doubt since it last agreed; after ``DRIFTED`` if a slide that could not be seen may have moved the
-train so far; after ``MISPLACED`` otherwise. Until then the front is in the hull if either is right.
-What is believed wrongly then needs ranges that are wrong alike for so long while the odometer
-counts: those of another train or of a wrong station, which the zone controller has checked.
+each other, are believed alone in the end, but only where a slide or spin that could not be seen may
+have put the train so far: within ``UNSEEN_M``, and ``UNSEEN_PART`` of the way since a range last
+agreed. ``DOUBTED`` of them are enough if the odometer has been in doubt since, ``DRIFTED`` if not.
+So a range that is wrong by more, as that of a station beyond a dead one, is never believed at a
+stand, and of a train that runs only if it is wrong alike for twice the way by which it is wrong.
+Until then the front is in the hull, which holds it if either is right.
 
 **Odometer and range are compared** over windows of ``WINDOW_S``: a way between two ranges that the
-wheels cannot have counted puts the odometer in doubt, one that they can have counted ends a doubt.
+wheels cannot have counted puts the odometer in doubt, one of ``PROVING_M`` that they have counted
+ends all doubt.
 Where the wheels step, slide or spin may just have ended: the interval grows by what they may have
 miscounted since a range last agreed.
 
@@ -63,12 +65,14 @@ class Confirmation(NamedTuple):
 LOCATING: Final = Confirmation(3, 1.0)
 DOUBTED: Final = Confirmation(3, 1.0)
 DRIFTED: Final = Confirmation(10, 10.0)
-MISPLACED: Final = Confirmation(10, 30.0)
 #: An unseen slide or spin miscounts at most this part of the way, and so much besides [m].
 UNSEEN_PART: Final = 0.5
 UNSEEN_M: Final = 20.0
 #: Ranges so far apart are compared with what the wheels counted between them [s].
 WINDOW_S: Final = 4.0
+#: Way that proves that the wheels count, and one that tells that the train stands [m].
+PROVING_M: Final = 10.0
+SAME_PLACE_M: Final = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -348,19 +352,22 @@ class TrainLocation:
         else:
             ranged = self._ranged = _Interval(low_m, high_m, 1, told.time_s)
         needed = self._needed(ranged)
-        if ranged.ranges >= needed.ranges and told.time_s - ranged.since_s >= needed.span_s - 1e-6:
+        if needed is None or ranged.ranges < needed.ranges:
+            return
+        if told.time_s - ranged.since_s >= needed.span_s - 1e-6:
             self._believe(ranged, told)
 
-    def _needed(self, ranged: _Interval) -> Confirmation:
-        """How many ranges in a row are believed against what is known."""
+    def _needed(self, ranged: _Interval) -> Confirmation | None:
+        """How many ranges in a row are believed against what is known; None if none are."""
         known, agreed = self._known, self._agreed
         if known is None:
             return LOCATING
-        if agreed is None or self._doubt_s >= agreed.time_s:
-            return DOUBTED
+        if agreed is None:
+            return DRIFTED
         unseen_m = UNSEEN_M + UNSEEN_PART * (self._readings[-1].distance_m - agreed.counter_m)
-        near = known.overlaps(ranged.low_m - unseen_m, ranged.high_m + unseen_m)
-        return DRIFTED if near else MISPLACED
+        if not known.overlaps(ranged.low_m - unseen_m, ranged.high_m + unseen_m):
+            return None
+        return DOUBTED if self._doubt_s >= agreed.time_s else DRIFTED
 
     def _compare(self, told: _Range) -> None:
         """Compare the way between two ranges with what the wheels counted."""
@@ -376,9 +383,15 @@ class TrainLocation:
             self._watch.suspect()
             self._doubt_s = self._readings[-1].time_s
             self._compared = told
-        elif told.time_s - since.time_s >= WINDOW_S:
+            return
+        elapsed_s = told.time_s - since.time_s
+        if elapsed_s < WINDOW_S:
+            return
+        self._compared = told
+        if counted_m >= PROVING_M:
             self._watch.trust()
-            self._compared = told
+        elif counted_m <= SAME_PLACE_M:
+            self._watch.bound(max(0.0, most_m) / elapsed_s)
 
     def location(self, time_s: float) -> Location:
         """Place of the front at a time from the history up to the latest reading.

@@ -83,6 +83,11 @@ class ModeSupervision:
         """The authority in force, which may be void."""
         return self._supervision.authority
 
+    @property
+    def released(self) -> bool:
+        """Whether the train runs on sight, or will as soon as it stands."""
+        return self._released or self._on_sight
+
     def update(
         self,
         time_s: float,
@@ -119,7 +124,7 @@ class ModeSupervision:
         if odometer_doubted:
             reason = out.reason if out.emergency_brake else ODOMETER_DOUBTED
             out = replace(out, warning=True, service_brake=True, reason=reason)
-        self.mode = self._mode_of(location, standing)
+        self.mode = self._mode_of(location, abs(speed_mps) <= STANDSTILL_MPS)
         return out
 
     def _note_releases(self, time_s: float) -> None:

@@ -112,15 +112,16 @@ class TrainProtection:
             self._begun, train = True, self._identity
             if time_ns == 0:
                 self._location.place(time_s, train.start_m, train.placed_m)
+        fastest_mps = self._location.fastest_mps if localizer is None else localizer.fastest_mps
         newest: ReceivedAuthority | None = None
         for frame in frames:
-            authority = self._read(frame, time_ns, max(abs(speed_mps), fastest_mps or 0.0))
+            authority = self._read(frame, time_ns, max(abs(speed_mps), fastest_mps))
             if authority is not None and (newest is None or authority.sealed_s > newest.sealed_s):
                 newest = authority
         doubted = localizer is None and self._location.odometer_doubted
         if localizer is None:
-            own_mps = self._location.fastest_mps if doubted else abs(speed_mps)
-            localizer = LocalizerView(self._location.location(time_s), speed_mps, own_mps)
+            here, fastest_mps = self._location.location(time_s), self._location.fastest_mps
+            localizer = LocalizerView(here, speed_mps, fastest_mps)
         self._here, self._fastest_mps = localizer.location, localizer.fastest_mps
         out = self._supervision.update(
             time_s,
@@ -177,6 +178,7 @@ class TrainProtection:
             train.length_m,
             self.whole,
             valid,
+            self._supervision.released,
         )
         return self._channel.channel.seal(FrameKind.LOCATION_REPORT, report.to_bytes(), time_ns)
 
@@ -184,6 +186,8 @@ class TrainProtection:
         """Values as ``ATP_STATE.columns``; NaN where there is none."""
         time_s = time_ns / NANOSECONDS
         here, held = self._here, self._supervision.authority
+        if held is not None and held.validity_s <= 0.0:
+            held = None  # it is told that there is none
         return (
             *self.counts,
             here.position_m if here.valid else nan,

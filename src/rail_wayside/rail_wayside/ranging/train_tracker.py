@@ -4,6 +4,10 @@ A transponder does not say which train it is on. As the signaller's train descri
 controller knows which trains enter where, and then follows each from zone to zone: a reading
 belongs to the train that can have got there (`rail_wayside.ranging.association`). What cannot be
 told is flagged, not guessed.
+
+What is known of where trains enter counts only from the start of the run, time 0. A tracker that is
+started later knows no train; it finds one by what it reports over the radio: the only reading in
+the only interval of a front that holds one is that train's.
 """
 
 from __future__ import annotations
@@ -34,6 +38,15 @@ class ZoneReading:
 
     range_m: float
     variance_m2: float
+
+
+@dataclass(frozen=True)
+class Reported:
+    """Track, and least and greatest chainage of a front, by what a train reports [m]."""
+
+    track: str
+    low_m: float
+    high_m: float
 
 
 NO_READING = ZoneReading(math.inf, math.inf)
@@ -70,23 +83,6 @@ class _TrackedTrain:
     filtered_m: float = 0.0
     fix: TrainFix | None = None
     unknown: str = field(default="not on the line yet")
-
-
-@dataclass(frozen=True)
-class _SaidPlace:
-    """Where a train has said to be."""
-
-    track: str
-    time_s: float
-    front_m: float
-    half_m: float
-    speed_mps: float
-
-    def holds(self, time_s: float, chainage_m: float, slack_m: float) -> bool:
-        """Whether it can be at a place, later."""
-        elapsed_s = max(0.0, time_s - self.time_s)
-        run_m = self.speed_mps * elapsed_s + 0.5 * MAX_ACCELERATION_MPS2 * elapsed_s**2
-        return abs(chainage_m - self.front_m) <= self.half_m + slack_m + run_m
 
 
 @dataclass(frozen=True)
@@ -139,31 +135,48 @@ class ZoneTracker:
     zone_map : ZoneMap
     trains : sequence of (train, zone)
         Trains in the order in which they enter the line, and the zone they are first seen in.
-    entering : bool
-        Whether they have yet to enter. One that is started later knows neither where they are nor
-        who is who; trains are identified by what they say themselves, see `identify`.
+
+    Attributes
+    ----------
+    unidentified, disturbed : tuple of str
+        Zones with a reading that is no train's, and with a signal that cannot be read.
+    restarted : bool
+        Whether its first tick came after time 0.
     """
 
-    def __init__(
-        self, zone_map: ZoneMap, trains: Sequence[tuple[str, str]], *, entering: bool = True
-    ) -> None:
-        self._map, self._entering = zone_map, entering
-        self._said: dict[str, _SaidPlace] = {}
+    def __init__(self, zone_map: ZoneMap, trains: Sequence[tuple[str, str]]) -> None:
+        self._map = zone_map
         self._trains = [
             _TrackedTrain(name, zone, zone_map.zones[zone].start_m) for name, zone in trains
         ]
         self._order = RunningOrder()
         self.unidentified: tuple[str, ...] = ()
         self.disturbed: tuple[str, ...] = ()
+        self.restarted: bool | None = None
 
-    def identify(
-        self, train: str, track: str, time_s: float, front_m: float, half_m: float, speed_mps: float
-    ) -> None:
-        """Take where a train has said that it was, within a half-width, and how fast."""
-        self._said[train] = _SaidPlace(track, time_s, front_m, half_m, speed_mps)
+    def leave(self, train: str) -> None:
+        """Forget a train that has left the control area: it is in no zone any more."""
+        for each in self._trains:
+            if each.name == train:
+                each.left = True
 
-    def update(self, time_s: float, readings: Mapping[str, ZoneReading]) -> list[TrainFix]:
-        """Fixes of all trains from the readings [zone] of one tick."""
+    def update(
+        self,
+        time_s: float,
+        readings: Mapping[str, ZoneReading],
+        reported: Mapping[str, Reported] | None = None,
+    ) -> list[TrainFix]:
+        """Fixes of all trains from the readings of one tick.
+
+        Parameters
+        ----------
+        time_s : float
+        readings : mapping of zone to ZoneReading
+        reported : mapping of train to Reported, optional
+            Where fronts are by radio; used only for trains that a tracker started anew looks for.
+        """
+        if self.restarted is None:
+            self.restarted = time_s > 0.0
         located_in: list[_ReadingPlace] = []
         disturbed: list[str] = []
         for name, reading in readings.items():
@@ -177,10 +190,8 @@ class ZoneTracker:
                     located_in.append(_ReadingPlace(name, *located))
         self.disturbed = tuple(disturbed)
         places = _Places(self._map, located_in)
-        if not self._entering:
-            self._identify(time_s, places)
         distances_m = places.distances_m()
-        owners = self._assign(time_s, places, distances_m)
+        owners = self._assign(time_s, places, distances_m, reported or {})
         owned = {*owners.values()}
         self.unidentified = tuple(
             place.zone for index, place in enumerate(places.all) if index not in owned
@@ -196,26 +207,12 @@ class ZoneTracker:
             fixes.append(self._fix(train, index in owners, shared, readings))
         return fixes
 
-    def _identify(self, time_s: float, places: _Places) -> None:
-        """Take readings for those of trains that have said to be there, and no other there."""
-        for number, place in enumerate(places.all):
-            track, sigma_m = self._map.zones[place.zone].track, math.sqrt(place.variance_m2)
-            there = [
-                train
-                for train in self._trains
-                if (said := self._said.get(train.name)) is not None
-                and said.track == track
-                and said.holds(time_s, place.chainage_m, SIGMAS * sigma_m)
-            ]
-            if len(there) == 1 and not there[0].entered:
-                self._follow(there[0], time_s, places[number])
-                there[0].regained_s = time_s
-
     def _assign(
         self,
         time_s: float,
         places: _Places,
         distances_m: Mapping[tuple[int, int], float],
+        reported: Mapping[str, Reported],
     ) -> dict[int, int]:
         """Index of the place of each train."""
         candidates: list[TrainCandidate] = []
@@ -227,12 +224,27 @@ class ZoneTracker:
                 misses = self._misses(train, time_s, places)
                 followed = time_s - train.seen_s <= FOLLOWED_S
                 candidates.append(TrainCandidate(index, followed, misses))
-            elif self._entering and train.zone not in due:
+            elif self.restarted:
+                here = self._in_interval(places, reported.get(train.name))
+                candidates.append(TrainCandidate(index, False, here))
+            elif train.zone not in due:
                 # Trains that are due at a zone enter there in their order.
                 due.add(train.zone)
                 here = dict.fromkeys(places.of(train.zone), 0.0)
                 candidates.append(TrainCandidate(index, False, here))
         return associate(candidates, distances_m, self._order)
+
+    def _in_interval(self, places: _Places, where: Reported | None) -> dict[int, float]:
+        """The places in a reported interval; they count alike."""
+        if where is None:
+            return {}
+        found: dict[int, float] = {}
+        for number, place in enumerate(places.all):
+            slack_m = GATE_M + SIGMAS * math.sqrt(place.variance_m2)
+            inside = where.low_m - slack_m <= place.chainage_m <= where.high_m + slack_m
+            if inside and self._map.zones[place.zone].track == where.track:
+                found[number] = 0.0
+        return found
 
     def _misses(self, train: _TrackedTrain, time_s: float, places: _Places) -> dict[int, float]:
         """How far each place in reach is from where the train is expected, over what it may be."""
@@ -276,6 +288,9 @@ class ZoneTracker:
             train.entered = True
             train.zone, train.filtered_m = place.zone, place.chainage_m
             train.p_ss, train.p_sv, train.p_vv = place.variance_m2, 0.0, 30.0**2
+            train.speed_mps = 0.0
+            if self.restarted:
+                train.regained_s = time_s
         else:
             elapsed_s = time_s - train.seen_s
             if elapsed_s > FOLLOWED_S:
@@ -341,7 +356,7 @@ class ZoneTracker:
             if math.isfinite(reading.variance_m2):
                 return train.fix
         if not train.entered:
-            reason = train.unknown if self._entering else "not identified since the restart"
+            reason = train.unknown
         elif train.left:
             reason = f"has left the line past {train.zone}"
         elif train.zone in shared:

@@ -17,12 +17,17 @@ told an end
 that is nearer by as much. An end that comes back towards the train is said to be shortened; that
 happens only if something got worse.
 
+**After a restart** of the zone controller nothing is known: neither where trains are nor which
+authorities they hold. On a track no authority is given until the old ones have expired, and every
+train of the track has since reported that it stands, or has been found not to be there (`Opening`).
+
 All times are those of one clock; a difference of clocks is part of the uncertainty of a report.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from math import inf
 from typing import Final
 
@@ -30,6 +35,7 @@ from rail_msgs_py.train_radio.movement_authority import FASTEST_MPS, FURTHEST_M,
 from rail_msgs_py.train_radio.train_report import LocationReport
 
 from .authority import IssuedAuthority, to_telegram
+from .opening import Opening
 from .speed_profile import Segment
 from .train_bounds import TrainBounds, TrainStart, Trouble
 from .train_order import TrainOrder, inverted
@@ -113,6 +119,8 @@ class MovingBlock:
                 raise ValueError(f"segments: number {segment.number} is given twice")
             self._train_orders[segment.number] = TrainOrder(segment)
         self._trains: dict[int, TrainBounds] = {}
+        self._rank = 0
+        self._opening: Opening | None = None
         for train in trains:
             self.add(train)
 
@@ -134,8 +142,10 @@ class MovingBlock:
         if start.segment not in self._train_orders:
             raise ValueError(f"segment: {start.segment} of train {start.number} is not known")
         line = self._train_orders[start.segment]
+        self._rank += 1
         bounds = TrainBounds(
             start,
+            rank=self._rank,
             fastest_mps=line.segment.fastest_mps + self._overspeed_mps,
             roll_back_m=self._margin_m,
             sigmas=self._sigmas,
@@ -144,6 +154,63 @@ class MovingBlock:
         self._trains[start.number] = bounds
         if bounds.placed:
             line.insert(bounds)
+
+    def restart(self, time_s: float) -> None:
+        """Know nothing of places and authorities: the controller was switched on at that time."""
+        starts = [replace(bounds.start, front_m=None) for bounds in self._trains.values()]
+        for bounds in tuple(self._trains.values()):
+            self.remove(bounds.start.number)
+        self._rank = 0
+        for start in starts:
+            self.add(start)
+        self._opening = Opening(time_s, self._validity_s)
+
+    def sweep(self, time_s: float, segment: int, clear: bool) -> None:
+        """Take note whether ranging found every train of a track, and no other, at a time."""
+        if self._opening is not None:
+            self._opening.sweep(time_s, segment, clear)
+
+    def missing(self, segment: int, time_s: float) -> tuple[str, ...]:
+        """Names of trains for which a track waits after a restart; empty if it waits for none."""
+        if self._opening is None:
+            return ()
+        there = [each for each in self._trains.values() if each.start.segment == segment]
+        return self._opening.missing(segment, time_s, there)
+
+    def everywhere(self, train: int, time_s: float) -> bool:
+        """Whether a train without a place is the only one of its track that is not accounted for.
+
+        Then a range that belongs to no other train is its own.
+        """
+        bounds = self._trains.get(train)
+        if bounds is None or bounds.placed or not bounds.invalid or self._opening is None:
+            return False
+        there = [
+            each for each in self._trains.values() if each.start.segment == bounds.start.segment
+        ]
+        silent = self._opening.silent(time_s)
+        return all(each is bounds or each.placed or (silent and not each.heard) for each in there)
+
+    def release(self, train: int, time_s: float, speed_mps: float) -> None:
+        """Take note that a person lets a train run on sight from a time on."""
+        bounds = self._trains.get(train)
+        if bounds is not None:
+            bounds.release(time_s, speed_mps)
+
+    def front_between(self, train: int, time_s: float) -> tuple[float, float] | None:
+        """Least and greatest chainage of the front at a time, None if not known."""
+        bounds = self._trains.get(train)
+        if bounds is None or not bounds.placed or bounds.strayed:
+            return None
+        ends = [bounds.direction * at_m for at_m in bounds.front_between_m(time_s)]
+        return min(ends), max(ends)
+
+    def place_of(self, train: int) -> tuple[int, int, bool] | None:
+        """Segment and direction of a train in service, and whether its reports are valid."""
+        bounds = self._trains.get(train)
+        if bounds is None:
+            return None
+        return bounds.start.segment, bounds.direction, bounds.placed and not bounds.invalid
 
     def remove(self, train: int) -> None:
         """Forget a train that has left."""
@@ -227,12 +294,15 @@ class MovingBlock:
     def authority(self, train: int, time_s: float) -> IssuedAuthority | None:
         """Issue the authority of a train at a time; it occupies what it is given.
 
-        None if it is not in service, its place is not known, or it reports another track.
+        None if it is not in service, its place is not known, it reports another track, or its track
+        waits for trains after a restart.
         """
         bounds = self._trains.get(train)
         if bounds is None or not bounds.placed or bounds.strayed:
             return None
         number, direction = bounds.start.segment, bounds.direction
+        if self.missing(number, time_s):
+            return None
         line = self._train_orders[number]
         end_m = line.end_m(direction) - self._end_margin_m
         if train in self._leaving:
@@ -242,7 +312,7 @@ class MovingBlock:
         if ahead is not None:
             before_m = ahead.rear_m
             if oncoming := ahead.direction != direction:
-                before_m = -ahead.reserve_m
+                before_m = -ahead.reserve_at_m(time_s)
             if before_m - self._margin_m < end_m:
                 end_m = before_m - self._margin_m
                 cause = ahead.as_oncoming if oncoming else ahead.as_leader

@@ -10,7 +10,7 @@ from rail_msgs_py.train_radio import quantities
 from rail_msgs_py.train_radio.train_channel import EndSettings, controller_end
 from rail_msgs_py.train_radio.unit_clock import ClockParameters, unit_clock_of
 
-from .authority_issuer import AuthorityIssuer
+from .authority_issuer import AuthorityIssuer, Release
 from .moving_block import MovingBlock
 from .speed_profile import Segment
 from .train_bounds import TrainStart
@@ -40,6 +40,13 @@ class AuthorityParameters(ClockParameters):
     train_starts_m: tuple[float, ...] = parameter((), "front at first", unit="m")
     leaves_at_m: tuple[float, ...] = parameter(
         (), "where it passes to the next control area; 0 = nowhere", unit="m", low=0.0
+    )
+    released_trains: tuple[int, ...] = parameter(
+        (), "numbers of trains that a person releases to run on sight, one for each release"
+    )
+    released_at_s: tuple[float, ...] = parameter((), "when, simulated time", unit="s", low=0.0)
+    released_mps: tuple[float, ...] = parameter(
+        (), "speed that each must not exceed on sight", unit="m/s", low=0.0
     )
     placed_m: float = PLACED.parameter()
     margin_m: float = quantities.MARGIN.parameter()
@@ -79,6 +86,11 @@ def authority_issuer_of(p: AuthorityParameters) -> AuthorityIssuer | None:
         raise ParameterError(
             f"zone_controller: limits_mps: {len(p.limits_mps)} for {sum(p.limit_counts)} limits"
         )
+    if not len(p.released_trains) == len(p.released_at_s) == len(p.released_mps):
+        raise ParameterError(
+            f"zone_controller: released_at_s: {p.released_at_s}: one, and a speed, for each of"
+            f" {len(p.released_trains)} releases"
+        )
     try:
         return _authority_issuer(p)
     except ValueError as error:
@@ -115,4 +127,12 @@ def _authority_issuer(p: AuthorityParameters) -> AuthorityIssuer:
         number: controller_end(EndSettings(secret, p.seed, number, p.tick_s, clock))
         for number, secret in zip(p.train_numbers, p.secrets, strict=True)
     }
-    return AuthorityIssuer(block, channels, p.bases, leaves_at_m=leaves, fix_sigmas=p.fix_sigmas)
+    releases = map(Release, p.released_trains, p.released_at_s, p.released_mps)
+    return AuthorityIssuer(
+        block,
+        channels,
+        p.bases,
+        leaves_at_m=leaves,
+        fix_sigmas=p.fix_sigmas,
+        releases=releases,
+    )

@@ -8,7 +8,7 @@ report [lo, hi]       its front by the newest valid report (at first: by the dis
 proven [lo, hi]       its front by the newest report that could follow from the one before
 ranged [lo, hi]       its front by phase ranging, k sigma to either side
 reserve_m             furthest that the front can be or come: the end of any authority that the
-                      train may still hold
+                      train may still hold, and beyond it on sight since a person's release
 ===================== =======================================================================
 
 With the highest speed V and the roll-back M (the margin behind a train), the front that was in
@@ -110,6 +110,8 @@ class TrainBounds:
     Parameters
     ----------
     start : TrainStart
+    rank : int
+        Its place in the order in which trains enter service, the first ahead.
     fastest_mps : float
         V, that the train surely does not exceed.
     roll_back_m : float
@@ -124,13 +126,14 @@ class TrainBounds:
         self,
         start: TrainStart,
         *,
+        rank: int = 0,
         fastest_mps: float,
         roll_back_m: float,
         sigmas: float,
         standing_mps: float,
     ) -> None:
         self.start = start
-        self.direction = start.direction
+        self.direction, self.rank = start.direction, rank
         self.length_m = up(start.length_m, PER_METRE_COARSE) / PER_METRE_COARSE
         self._fastest_mps, self._roll_back_m = fastest_mps, roll_back_m
         self._sigmas, self._standing_mps = sigmas, standing_mps
@@ -153,6 +156,10 @@ class TrainBounds:
         self._kept_m = 0.0  # worst rear of the proven reports
         self._proven = self._report = self._range = (-inf, 0.0, 0.0)
         self._report_rear_m = 0.0
+        #: Time and speed of a release to run on sight that is in force.
+        self._on_sight: tuple[float, float] | None = None
+        #: Time of the newest report of a train that stands.
+        self.stood_s = -inf
         self._start_m = -inf  # furthest front of a train that has not moved on an authority
         self._leap_s = self._clash_s = -inf
         #: End of the authority in force, and of a longer one that it may not have superseded.
@@ -172,6 +179,11 @@ class TrainBounds:
         self._hull()
 
     @property
+    def heard(self) -> bool:
+        """Whether any report of it was taken."""
+        return self._last_report_s > -inf
+
+    @property
     def reserve_m(self) -> float:
         """Furthest that the front can be or come on the authorities that the train may hold.
 
@@ -181,13 +193,36 @@ class TrainBounds:
         furthest_m = max(self.end_m, self.held_m, self._start_m) + self.lead_m
         return max(furthest_m, self.front_m) if self.leap or self.clash else furthest_m
 
+    def reserve_at_m(self, time_s: float) -> float:
+        """`reserve_m` at a time: on sight a train passes it."""
+        if self._on_sight is None:
+            return self.reserve_m
+        since_s, speed_mps = self._on_sight
+        beyond_m = speed_mps * max(time_s - max(since_s, self._known_s), 0.0)
+        return max(self.reserve_m, self.front_m) + beyond_m
+
     def front_at_m(self, time_s: float) -> float:
         """Furthest place of the front at a time.
 
-        At the highest speed since the newest knowledge, but not past its authority.
+        At the highest speed since the newest knowledge, but not past its authority or, on sight,
+        no further beyond it than the speed on sight has brought it.
         """
         furthest_m = self.front_m + self._fastest_mps * max(time_s - self._known_s, 0.0)
-        return min(furthest_m, self.reserve_m)
+        return min(furthest_m, self.reserve_at_m(time_s))
+
+    def front_between_m(self, time_s: float) -> tuple[float, float]:
+        """Least and furthest place of the front at a time."""
+        low_m = self._report[1]
+        if self.leap:
+            low_m = min(low_m, self._proven[1])
+        if self.clash:
+            low_m = min(low_m, self._range[1])
+        low_m -= self._roll_back_m
+        return low_m, max(low_m, self.front_at_m(time_s))
+
+    def release(self, time_s: float, speed_mps: float) -> None:
+        """Take note that a person lets it run on sight from a time on, no faster than a speed."""
+        self._on_sight = time_s, speed_mps
 
     def issue(self, time_s: float, end_m: float, validity_s: float) -> bool:
         """Take note of an authority given; whether it is shorter than the last one.
@@ -224,12 +259,18 @@ class TrainBounds:
         if time_s <= self._last_report_s:
             return False
         self._last_report_s = time_s
+        if report.speed_mps <= self._standing_mps:
+            self.stood_s = time_s
+        if report.on_sight and self._on_sight is None:
+            self.release(time_s, self._fastest_mps)
         self.invalid = not report.position_valid
         if self.invalid:
             return True
         self.strayed = report.segment != self.start.segment or report.direction != self.direction
         if self.strayed:
             return True
+        if self._on_sight is not None and not report.on_sight and time_s > self._on_sight[0]:
+            self._on_sight = None
         at_m, half_m = self.direction * report.offset_m, report.uncertainty_m
         where = (time_s, at_m - half_m, at_m + half_m)
         self.longer = report.length_m > self.length_m

@@ -32,10 +32,9 @@ class TrainOrder:
         return self.segment.length_m if direction > 0 else 0.0
 
     def insert(self, bounds: TrainBounds) -> None:
-        """Give a train its place in the order; among equals behind those already there."""
-        centres = [sum(other.centre_m) for other in self._order]
+        """Give a train its place in the order; among equals the one that entered first is ahead."""
         find = bisect_left if bounds.direction > 0 else bisect_right
-        self._order.insert(find(centres, sum(bounds.centre_m)), bounds)
+        self._order.insert(find(self._order, _key(bounds), key=_key), bounds)
         self._link()
 
     def remove(self, bounds: TrainBounds) -> None:
@@ -60,6 +59,10 @@ class TrainOrder:
             if nearest is None or near_m - margin_m < nearest[0]:
                 nearest = near_m - margin_m, f"stray {name}"
         return nearest
+
+
+def _key(bounds: TrainBounds) -> tuple[float, int]:
+    return sum(bounds.centre_m), -bounds.direction * bounds.rank
 
 
 def inverted(bounds: TrainBounds) -> bool:

@@ -9,6 +9,7 @@ from rail_msgs_py.train_radio.safe_channel import SafeChannel
 from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_onboard.train_radio.supervision import AuthoritySupervision
 from rail_onboard.train_radio.train_location import TrainLocation
+from rail_onboard.train_radio.train_modes import ModeSupervision
 from rail_onboard.train_radio.train_protection import TrainIdentity, TrainProtection
 from rail_wayside.train_radio.authority_issuer import AuthorityIssuer
 from rail_wayside.train_radio.moving_block import MovingBlock
@@ -47,11 +48,12 @@ class Corridor:
                 TrainIdentity(n, 0, start_m, placed_m, LENGTH_M),
                 SafeChannel(SECRET, n, CONTROLLER, (FrameKind.MOVEMENT_AUTHORITY,), draw),
                 TrainLocation(0.02),
-                AuthoritySupervision(LENGTH_M),
+                ModeSupervision(AuthoritySupervision(LENGTH_M)),
             )
             for n, start_m in starts_m.items()
         }
         self.tick = 0
+        self.run_m = 0.0
         self.down: dict[int, list[bytes]] = {}
         self.sent: dict[str, list[tuple[int, bytes]]] = {}
 
@@ -62,14 +64,15 @@ class Corridor:
         silent: tuple[int, ...] = (),
         speed_mps: float = 0.0,
     ) -> dict[int, str]:
-        """One tick of 250 ms with trains that do not move, whatever speed they tell; reasons."""
+        """One tick of 250 ms with trains that run at a speed; reasons."""
+        self.run_m += 0.25 * speed_mps
         now_ns, self.tick = self.tick * TICK_NS, self.tick + 1
         reasons, up = {}, {}
         for n, train in self.trains.items():
             frames = [] if n in deaf else self.down.get(n, [])
-            reasons[n] = train.tick(now_ns, 0.0, 0.0, frames).reason
+            reasons[n] = train.tick(now_ns, self.run_m, speed_mps, frames).reason
             if n not in silent:
-                up[n] = train.frame(now_ns, speed_mps)
+                up[n] = train.frame(now_ns)
         for n, frame in up.items():
             self.desk.receive("b1", n, frame, now_ns)
         self.sent = self.desk.telegrams(now_ns)
@@ -136,16 +139,22 @@ def test_frames_of_others_do_nothing() -> None:
     corridor.desk.receive("b1", 99, bytes(64), 0)  # no such slot
 
 
-def test_a_range_that_contradicts_the_reports_is_not_told() -> None:
+def test_a_range_that_contradicts_the_reports_makes_the_hull_of_both_and_heals() -> None:
     corridor = Corridor(placed_m=5.0)
     for _ in range(8):
         corridor.step()
-    before = corridor.trains[1].state_values((corridor.tick - 1) * TICK_NS)[3:5]
     for _ in range(4):
         corridor.desk.ranged(1, corridor.tick * 0.25, 0, 1300.0, 0.01**2)
         corridor.step()
-    assert corridor.trains[1].state_values((corridor.tick - 1) * TICK_NS)[3:5] == before
-    assert "report and range disagree" in corridor.desk.troubles(1)
+    front_m, half_m = corridor.trains[1].state_values((corridor.tick - 1) * TICK_NS)[3:5]
+    assert front_m - half_m == pytest.approx(995.0)
+    assert front_m + half_m == pytest.approx(1300.0 + 4 * 0.01 + 1.5, abs=0.11)
+    for _ in range(4):
+        corridor.desk.ranged(1, corridor.tick * 0.25, 0, 1000.4, 0.01**2)
+        corridor.step()
+    front_m, half_m = corridor.trains[1].state_values((corridor.tick - 1) * TICK_NS)[3:5]
+    assert half_m <= 1.65 and abs(front_m - 1000.4) <= 0.01
+    assert not corridor.desk.troubles(1)
 
 
 def test_a_fix_moves_the_location() -> None:

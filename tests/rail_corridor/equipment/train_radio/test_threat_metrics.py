@@ -25,6 +25,7 @@ from rail_msgs_py.train_radio.telegrams import Telegrams
 from rail_msgs_py.train_radio.train_channel import CONTROLLER_IDENTITY
 from rail_onboard.train_radio.supervision import AuthoritySupervision
 from rail_onboard.train_radio.train_location import TrainLocation
+from rail_onboard.train_radio.train_modes import ModeSupervision
 from rail_onboard.train_radio.train_protection import TrainIdentity, TrainProtection
 from rail_wayside.train_radio.authority_issuer import AuthorityIssuer
 from rail_wayside.train_radio.moving_block import MovingBlock
@@ -68,7 +69,7 @@ def ride(
             TrainIdentity(n, 0, at_m, 1.0, LENGTH_M),
             end(SECRET, n, CONTROLLER_IDENTITY, (down,), draw),
             TrainLocation(0.02),
-            AuthoritySupervision(LENGTH_M),
+            ModeSupervision(AuthoritySupervision(LENGTH_M)),
         )
         for n, at_m in STARTS_M.items()
     }
@@ -86,7 +87,7 @@ def ride(
         for n, train in trains.items():
             mine = [heard[base][n] for base in BASES if n in heard[base]]
             train.tick(now_ns, SPEED_MPS * TICK_S * tick, SPEED_MPS, mine)
-            given[n] = train.frame(now_ns, SPEED_MPS)
+            given[n] = train.frame(now_ns)
             made[ATP_STATE].put(tick, n - 1, np.array(train.state_values(now_ns)))
         rows: dict[int, list[tuple[float, ...]]] = {n: [] for n in trains}
         for base, arrived in net.up(now_ns, frames).items():
@@ -202,7 +203,7 @@ def test_a_report_that_the_train_did_not_give(column: str, value: float) -> None
     made = recording()
     for tick in range(21):
         made[STATE].put(tick, slice(None), np.zeros((2, len(STATE.columns))))
-        belief = [0.0, 0.0, 0.0, 1000.0 + tick, 1.0, np.nan, np.inf]
+        belief = [0.0, 0.0, 0.0, 1000.0 + tick, 1.0, np.nan, np.inf, 2.0, 0.0]
         made[ATP_STATE].put(tick, 0, np.array(belief))
         assert len(belief) == len(ATP_STATE.columns)
     sound = dict.fromkeys(REPORTS.columns, 1.0) | {"segment": 0.0, "length_m": 118.0}
@@ -219,7 +220,9 @@ def test_a_report_from_a_train_that_had_fallen_silent_is_forged() -> None:
     for tick in range(12):
         made[STATE].put(tick, slice(None), np.zeros((2, len(STATE.columns))))
         if tick < 8:
-            made[ATP_STATE].put(tick, 0, np.array([0.0, 0.0, 0.0, 1000.0, 1.0, np.nan, np.inf]))
+            made[ATP_STATE].put(
+                tick, 0, np.array([0.0, 0.0, 0.0, 1000.0, 1.0, np.nan, np.inf, 2.0, 0.0])
+            )
     row = dict.fromkeys(REPORTS.columns, 1.0) | {"segment": 0.0, "offset_m": 1000.0}
     for tick, forged in ((7, 0), (8, 0), (9, 1)):
         # What was sealed in the tick after the last record may have been sent by a dying train.
@@ -239,7 +242,9 @@ def test_a_train_that_does_not_know_its_place_gives_no_valid_position() -> None:
     for half_m, front_m, valid in ((1.0, 1000.0, 1.0), (np.inf, np.nan, 0.0), (7e3, 1000.0, 0.0)):
         for tick in range(4):
             made[STATE].put(tick, slice(None), np.zeros((2, len(STATE.columns))))
-            made[ATP_STATE].put(tick, 0, np.array([0.0, 0.0, 0.0, front_m, half_m, np.nan, np.inf]))
+            made[ATP_STATE].put(
+                tick, 0, np.array([0.0, 0.0, 0.0, front_m, half_m, np.nan, np.inf, 2.0, 0.0])
+            )
         for told in (0.0, 1.0):
             rows = np.array([list((row | {"sealed_s": TICK_S, "position_valid": told}).values())])
             made.events(REPORTS).put(3, 0, rows)

@@ -48,7 +48,8 @@ class Protection:
 
     def __init__(self, graph: Any, given: dict[str, Any], **changes: Any) -> None:
         self.graph = graph
-        given = given | changes
+        # Half-way between its ticks the zone controller takes and gives frames.
+        given = given | {"tick_s": TICK_S / 2} | changes
         self.command = graph.mailbox(COMMAND, train=TRAIN, supervision="atp")
         self.state = graph.mailbox(ATP_STATE, train=TRAIN)
         self.telegrams = graph.mailbox(TRAIN_TELEGRAMS, train=TRAIN)
@@ -77,6 +78,11 @@ class Protection:
     def now_ns(self) -> int:
         return seconds_to_ns(self.ticks * TICK_S)
 
+    @property
+    def controller_ns(self) -> int:
+        """Time at which the zone controller acts: half a tick ago."""
+        return max(0, self.now_ns - seconds_to_ns(TICK_S / 2))
+
     def authority(self, end_m: float = 2000.0, **changes: Any) -> bytes:
         """Seal an authority, or a greeting while there is no session."""
         fields: dict[str, Any] = {
@@ -89,7 +95,7 @@ class Protection:
         }
         told = MovementAuthority(**fields | changes)
         return bytes(
-            self.controller.seal(FrameKind.MOVEMENT_AUTHORITY, told.to_bytes(), self.now_ns)
+            self.controller.seal(FrameKind.MOVEMENT_AUTHORITY, told.to_bytes(), self.controller_ns)
         )
 
     def tick(
@@ -124,7 +130,7 @@ class Protection:
         """The zone controller takes what the train has just sent; its report, if it is one."""
         report = None
         for frame in self.frames:
-            opened = self.controller.open(frame, self.now_ns)
+            opened = self.controller.open(frame, self.controller_ns)
             if isinstance(opened, Accepted):
                 report = LocationReport.from_bytes(opened.payload)
         return report
@@ -162,7 +168,9 @@ def test_it_is_released_by_an_authority_and_reports_its_place(graph: Any, given:
     assert run["service_brake"] == run["emergency_brake"] == 0.0
     assert 15.0 < run["permitted_mps"] <= 20.0
     state = last(train.state)
-    assert (state["end_of_authority_m"], state["authority_age_s"]) == (2000.0, 0.0)
+    assert state["end_of_authority_m"] == 2000.0
+    # Half a tick on the way, and what clocks may have drifted.
+    assert TICK_S / 2 < state["authority_age_s"] < TICK_S / 2 + 1e-3
     train.tick([train.authority(2000.0)], way_m=10.0)
     report = train.hears()
     assert report is not None
@@ -195,7 +203,8 @@ def test_what_others_sealed_or_sealed_for_others_is_refused(graph: Any, given: A
     train.tick([good])
     assert last(train.state)["end_of_authority_m"] == 1900.0
     train.tick([good])
-    assert last(train.state)["authority_age_s"] == TICK_S
+    # One tick older than when it came.
+    assert last(train.state)["authority_age_s"] == pytest.approx(1.5 * TICK_S, abs=1e-3)
 
 
 def test_it_brakes_once_its_authority_is_too_old(graph: Any, given: Any) -> None:
@@ -204,9 +213,10 @@ def test_it_brakes_once_its_authority_is_too_old(graph: Any, given: Any) -> None
     train.hears()
     train.greet()
     assert train.tick([train.authority()])["service_brake"] == 0.0
-    for age in range(1, 13):  # up to 3 s it holds
+    for age in range(1, 12):  # up to 3 s it holds, half a tick of which it was on its way
         assert train.tick()["service_brake"] == 0.0, age
-    assert last(train.state)["authority_age_s"] == TIMEOUT_S
+    age_s = last(train.state)["authority_age_s"]
+    assert age_s == pytest.approx(TIMEOUT_S - TICK_S / 2, abs=1e-3)
     late = train.tick()
     assert (late["service_brake"], late["permitted_mps"]) == (1.0, 0.0)
     assert last(train.state)["end_of_authority_m"] == 2000.0
@@ -322,7 +332,8 @@ def test_with_a_localizer_it_is_where_that_says_or_where_ranges_say(graph: Any, 
     assert (state["front_m"], state["uncertainty_m"]) == (1252.0, 2.0)
     # What the wayside ranged goes on to the localizer, of the very time it was sealed.
     graph.wait(lambda: len(train.told) >= train.ticks - 4)
-    assert list(last(train.told).values()) == pytest.approx([(train.ticks - 1) * TICK_S, *located])
+    sealed_s = (train.ticks - 1.5) * TICK_S
+    assert list(last(train.told).values()) == pytest.approx([sealed_s, *located], abs=1e-3)
     lost = train.tick([train.authority()], place=None)
     assert lost["service_brake"] == 1.0
     assert math.isnan(last(train.state)["front_m"])

@@ -189,7 +189,7 @@ def test_who_could_not_stop_before_it_left_and_is_silent_has_left(
     speed_mps: float, leaves: bool
 ) -> None:
     # 20 m/s and 1.5 m/s^2 are 133 m, 5 m/s are 8 m; it is 50 m before the border.
-    corridor = Corridor(first_m=2950.0, leaves_at_m={1: 3000.0})
+    corridor = Corridor(first_m=2950.0 - 3.0 * speed_mps, leaves_at_m={1: 3000.0})
     for _ in range(12):
         corridor.step(speed_mps=speed_mps)
     assert corridor.block.trains == (1, 2)

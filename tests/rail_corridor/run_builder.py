@@ -204,6 +204,8 @@ class RunBuilder:
             speed_mps=0.0,
             speed_low_mps=-1.0,
             speed_high_mps=1.0,
+            fastest_mps=1.0,
+            wheels_doubted=0.0,
             sigma_m=0.5,
         )
         return self

@@ -545,10 +545,14 @@ MUTANTS: list[Mutant] = [
         " ::test_fixes_that_contradict_each_other_leave_the_hull_until_one_agrees",
         (
             "the wheels are exact",
-            "self._high_m += (1.0 + self._error) * run_m",
-            "self._high_m += run_m",
+            "interval.high_m += most_m",
+            "interval.high_m += distance_m - last.distance_m",
         ),
-        ("a contradiction is not noticed", "if not self.consistent:", "if False:"),
+        (
+            "a contradiction is not noticed",
+            "if known is not None and known.overlaps(low_m, high_m):",
+            "if False:",
+        ),
     ),
     *_group(
         f"{ONBOARD}/train_radio/train_protection.py",

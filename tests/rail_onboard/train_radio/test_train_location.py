@@ -196,3 +196,33 @@ def test_the_front_is_always_in_the_interval(
         here = where.location(time_s)
         if here.valid:
             assert abs(here.position_m - direction * s) <= here.uncertainty_m + 1e-9
+
+
+def test_ranges_in_a_row_locate_a_train_that_knows_nothing() -> None:
+    where = TrainLocation(0.0)
+    for tick, at_m in enumerate((1000.0, 400.0, 1000.0, 1000.5, 1001.0)):
+        where.update(0.5 * tick, 100.0, 0.0)
+        where.fix(0.5 * tick, at_m, 2.0)
+        # One from elsewhere breaks the row: three, over a second, are needed after it.
+        assert where.location(0.5 * tick).valid == (tick == 4)
+    assert where.location(2.0).position_m == 1000.0
+
+
+def test_ranges_that_go_on_to_contradict_are_believed_where_a_slide_can_have_put_the_train() -> (
+    None
+):
+    for off_m, believed in ((15.0, True), (300.0, False)):
+        where = TrainLocation(0.0)
+        for tick in range(60):
+            where.update(0.5 * tick, 0.0, 0.0)
+            if tick == 0:
+                where.place(0.0, 1000.0, 2.0)
+            where.fix(0.5 * tick, 1000.0 + off_m, 2.0)
+            here = where.location(0.5 * tick)
+            if tick < 20:  # in the hull for ten seconds
+                assert (here.position_m, here.uncertainty_m) == (
+                    1000.0 + off_m / 2.0,
+                    2.0 + off_m / 2.0,
+                )
+        assert (where.location(29.5).uncertainty_m == 2.0) == believed
+        assert where.consistent == believed

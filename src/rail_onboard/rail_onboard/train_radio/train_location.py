@@ -31,9 +31,9 @@ So a range that is wrong by more, as that of a station beyond a dead one, is nev
 stand, and of a train that runs only if it is wrong alike for twice the way by which it is wrong.
 Until then the front is in the hull, which holds it if either is right.
 
-**Odometer and range are compared** over windows of ``WINDOW_S``: a way between two ranges that the
-wheels cannot have counted puts the odometer in doubt, one of ``PROVING_M`` that they have counted
-ends all doubt.
+**Odometer and range are compared** over windows of ``WINDOW_S`` or more: a way between two ranges
+that the wheels cannot have counted puts the odometer in doubt, one of ``PROVING_M`` that they have
+counted ends all doubt.
 Where the wheels step, slide or spin may just have ended: the interval grows by what they may have
 miscounted since a range last agreed.
 
@@ -46,56 +46,27 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import deque
-from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from rail_onboard.track_code.supervision import STANDSTILL_MPS
 
+from .location_interval import (
+    DOUBTED,
+    DRIFTED,
+    LOCATING,
+    LONGEST_WINDOW_S,
+    PROVING_M,
+    SAME_PLACE_M,
+    UNSEEN_M,
+    UNSEEN_PART,
+    WINDOW_S,
+    Confirmation,
+    Interval,
+)
+from .location_interval import NOWHERE as NOWHERE
+from .location_interval import Location as Location
 from .odometer_watch import OdometerWatch, RunningLimits
-
-
-class Confirmation(NamedTuple):
-    """Ranges in a row, and the time that they must span [s]."""
-
-    ranges: int
-    span_s: float
-
-
-LOCATING: Final = Confirmation(3, 1.0)
-DOUBTED: Final = Confirmation(3, 1.0)
-DRIFTED: Final = Confirmation(10, 10.0)
-#: An unseen slide or spin miscounts at most this part of the way, and so much besides [m].
-UNSEEN_PART: Final = 0.5
-UNSEEN_M: Final = 20.0
-#: Ranges so far apart are compared with what the wheels counted between them [s].
-WINDOW_S: Final = 4.0
-#: Way that proves that the wheels count, and one that tells that the train stands [m].
-PROVING_M: Final = 10.0
-SAME_PLACE_M: Final = 0.2
-
-
-@dataclass(frozen=True, slots=True)
-class Location:
-    """Place of the front of a train.
-
-    Parameters
-    ----------
-    position_m : float
-        Chainage.
-    uncertainty_m : float
-        The front is within ``position_m`` ± this.
-    valid : bool
-        Whether the two mean anything.
-    """
-
-    position_m: float
-    uncertainty_m: float
-    valid: bool
-
-
-#: Nothing is known.
-NOWHERE = Location(0.0, inf, False)
 
 
 class _Reading(NamedTuple):
@@ -120,28 +91,6 @@ class _Range(NamedTuple):
     low_m: float
     high_m: float
     counter_m: float  # of the odometer at that time
-
-
-@dataclass(slots=True)
-class _Interval:
-    """Interval of s at the latest reading, and the ranges in a row that it stands on."""
-
-    low_m: float
-    high_m: float
-    ranges: int = 1
-    since_s: float = 0.0
-
-    @property
-    def width_m(self) -> float:
-        return self.high_m - self.low_m
-
-    def overlaps(self, low_m: float, high_m: float) -> bool:
-        return low_m <= self.high_m and high_m >= self.low_m
-
-    def take(self, low_m: float, high_m: float) -> None:
-        """Intersect it with one that overlaps it, if that is narrower."""
-        if high_m - low_m < self.width_m:
-            self.low_m, self.high_m = max(low_m, self.low_m), min(high_m, self.high_m)
 
 
 class TrainLocation:
@@ -207,8 +156,8 @@ class TrainLocation:
         """Forget everything, as when switched on."""
         self._readings.clear()
         self._watch.reset()
-        self._known: _Interval | None = None
-        self._ranged: _Interval | None = None  # by ranges alone, not believed yet
+        self._known: Interval | None = None
+        self._ranged: Interval | None = None  # by ranges alone, not believed yet
         self._agreed: _Range | None = None  # the last one that agreed with what was known
         self._compared: _Range | None = None  # where the window of the comparison begins
         self._doubt_s = -inf  # when the odometer was last in doubt
@@ -327,7 +276,7 @@ class TrainLocation:
         told = _Range(time_s, low_m - run.slack_m, high_m + run.slack_m, counter_m)
         low_m, high_m = low_m + run.least_m, high_m + run.most_m
         if sure:
-            self._believe(_Interval(low_m, high_m), told)
+            self._believe(Interval(low_m, high_m), told)
             return True
         self._compare(told)
         known = self._known
@@ -340,7 +289,7 @@ class TrainLocation:
         self._collect(low_m, high_m, told)
         return True
 
-    def _believe(self, interval: _Interval, told: _Range) -> None:
+    def _believe(self, interval: Interval, told: _Range) -> None:
         self._known, self._ranged, self._agreed = interval, None, told
 
     def _collect(self, low_m: float, high_m: float, told: _Range) -> None:
@@ -350,14 +299,14 @@ class TrainLocation:
             ranged.take(low_m, high_m)
             ranged.ranges += 1
         else:
-            ranged = self._ranged = _Interval(low_m, high_m, 1, told.time_s)
+            ranged = self._ranged = Interval(low_m, high_m, 1, told.time_s)
         needed = self._needed(ranged)
         if needed is None or ranged.ranges < needed.ranges:
             return
         if told.time_s - ranged.since_s >= needed.span_s - 1e-6:
             self._believe(ranged, told)
 
-    def _needed(self, ranged: _Interval) -> Confirmation | None:
+    def _needed(self, ranged: Interval) -> Confirmation | None:
         """How many ranges in a row are believed against what is known; None if none are."""
         known, agreed = self._known, self._agreed
         if known is None:
@@ -387,11 +336,13 @@ class TrainLocation:
         elapsed_s = told.time_s - since.time_s
         if elapsed_s < WINDOW_S:
             return
-        self._compared = told
         if counted_m >= PROVING_M:
             self._watch.trust()
         elif counted_m <= SAME_PLACE_M:
             self._watch.bound(max(0.0, most_m) / elapsed_s)
+        elif elapsed_s < LONGEST_WINDOW_S:
+            return  # the longer the way, the more it tells
+        self._compared = told
 
     def location(self, time_s: float) -> Location:
         """Place of the front at a time from the history up to the latest reading.

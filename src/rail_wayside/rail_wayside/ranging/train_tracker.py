@@ -347,7 +347,7 @@ class ZoneTracker:
             reading = readings[train.zone]
             outside_m = train.fix.chainage_m - zone.end_m
             if outside_m > 0.5 * zone.length_m:
-                return _with_reason(train.fix, self._beyond(train.zone))
+                return replace(train.fix, reason=self._beyond(train.zone))
             if train.seen_s - train.regained_s < CONFIRMED_S:
                 reason = f"found again in {train.zone}, not confirmed yet"
                 return replace(
@@ -409,16 +409,3 @@ class ZoneTracker:
             if distance_m is not None and abs(distance_m) < 1.5 * zone.length_m:
                 return name
         return None
-
-
-def _with_reason(fix: TrainFix, reason: str) -> TrainFix:
-    return TrainFix(
-        fix.train,
-        fix.zone,
-        fix.track,
-        fix.chainage_m,
-        fix.variance_m2,
-        fix.speed_mps,
-        fix.speed_variance_m2ps2,
-        reason,
-    )

@@ -31,7 +31,7 @@ from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
 from rail_msgs_py.topics.ranging import LINKS, POSITION, VRS_CHANNEL
-from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT
+from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT, OCCUPANCY
 from rail_msgs_py.topics.train_bus import BUS_LINK, BUS_LINKS, BUS_STATE
 from rail_msgs_py.topics.train_radio import ATP_STATE, AUTHORITY, CBTC_LINKS, RADIO_LINK, REPORTS
 from rail_msgs_py.topics.world import COMMAND, STATE
@@ -278,11 +278,18 @@ class RunBuilder:
         self._recording.events(REPORTS).put(tick, index, values)
         return self
 
-    def sent(self, circuit: str, word: ArrayLike) -> RunBuilder:
-        """The word that a track circuit sends."""
-        columns = dict.fromkeys(CODE_SENT.columns, 0.0) | {"word": word}
+    def sent(self, circuit: str, word: ArrayLike, speed: ArrayLike = 0xFF) -> RunBuilder:
+        """The word that a track circuit sends, and the speeds in it."""
+        columns = dict.fromkeys(CODE_SENT.columns, 0.0) | {"word": word, "speed": speed}
         number = self.circuits.index(circuit)
         self._put(self._recording[CODE_SENT], number, CODE_SENT.columns, **columns)
+        return self
+
+    def sensed(self, circuit: str, occupied: ArrayLike) -> RunBuilder:
+        """Whether a track circuit says that it is occupied."""
+        columns = dict.fromkeys(OCCUPANCY.columns, 0.0) | {"occupied": occupied}
+        number = self.circuits.index(circuit)
+        self._put(self._recording[OCCUPANCY], number, OCCUPANCY.columns, **columns)
         return self
 
     def understood(self, train: str, word: ArrayLike, valid: ArrayLike = 1.0) -> RunBuilder:
@@ -367,7 +374,7 @@ class RunBuilder:
             links = dict.fromkeys(LINKS.columns, 1000.0)
             self._put(self._recording[LINKS], index, LINKS.columns, **links)
         for number, circuit in enumerate(self.circuits):
-            self.sent(circuit, 100.0 + number)
+            self.sent(circuit, 100.0 + number).sensed(circuit, 1.0)
         for name in self.buses:
             self.bus(name)
 

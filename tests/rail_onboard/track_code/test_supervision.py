@@ -498,3 +498,30 @@ def test_a_driver_who_keeps_to_the_permitted_speed_is_never_braked() -> None:
     started = next(n for n, (*_, out) in enumerate(log) if not out.service_brake)
     braked = [x for x, _, _, out in log[started:] if out.service_brake]
     assert all(x > stop_m - 60.0 for x in braked)
+
+
+# Whose code it is ------------------------------------------------------------------------
+
+
+def named(identity: int, now_kmh: float = 80.0) -> dict[str, int]:
+    return code(now_kmh, now_kmh) | {"network": identity}
+
+
+def test_a_code_out_of_sequence_is_not_obeyed_but_at_a_stand() -> None:
+    ride = Ride()
+    for _ in range(50):
+        ride.tick(named(3, 40.0), 1700.0, 10.0)
+    # The next circuit is dead; the one after it, of the old carrier, leaks through.
+    out = [ride.tick(named(6, 130.0), 1700.0, 10.0) for _ in range(40)]
+    assert out[0].permitted_mps == pytest.approx(40.0 * KMH)
+    assert out[-1].reason == "no valid code"
+    stands = [ride.tick(named(6, 130.0), 1700.0, 0.0) for _ in range(40)]
+    assert not stands[-1].service_brake
+
+
+def test_the_next_circuit_is_obeyed_after_a_change_of_carrier() -> None:
+    ride = Ride()
+    ride.tick(named(3, 40.0), 1700.0, 10.0)
+    assert ride.tick(named(5, 60.0), 1700.0, 10.0).permitted_mps == pytest.approx(40.0 * KMH)
+    ride.tick(None, 2300.0, 10.0)
+    assert ride.tick(named(5, 60.0), 2300.0, 10.0).permitted_mps == pytest.approx(60.0 * KMH)

@@ -15,6 +15,7 @@ from .kills import KillParameters, draw_kill, look_at_kill
 from .link_margin.runs import LinkMarginParameters, draw_link_margin, look_at_link_margin
 from .threats import ThreatParameters, count_threats
 from .track_code_errors import TrackCodeErrorParameters, count_track_code_errors
+from .track_code_runs import TrackCodeRunParameters, draw_track_codes, look_at_track_codes
 from .train_bus import (
     TrainBusLimitParameters,
     TrainBusParameters,
@@ -29,6 +30,9 @@ GENERATORS: Final[Mapping[str, GeneratorSource]] = {
     "handover": GeneratorSource(HandoverParameters, draw_handover),
     "kills": GeneratorSource(KillParameters, draw_kill, look_at_kill),
     "link_margin": GeneratorSource(LinkMarginParameters, draw_link_margin, look_at_link_margin),
+    "track_code_runs": GeneratorSource(
+        TrackCodeRunParameters, draw_track_codes, look_at_track_codes
+    ),
 }
 CALCULATIONS: Final[Mapping[str, CalculationSource]] = {
     "integrity": CalculationSource(IntegrityParameters, count_integrity),

@@ -25,7 +25,11 @@ _FIELDS: Final = (
         "of the block in steps of 5 ‰ from -50 ‰ on, rounded downhill: 10 is level",
     ),
     Column("block_length", "of the block in steps of 25 m, rounded down"),
-    Column("network", "number of the network, 0 to 7; the circuits here send 0"),
+    Column(
+        "network",
+        "identity of the circuit: 3, 5, 6, 7 in turn along the track, so that no code can come "
+        "from the circuit after the next",
+    ),
 )
 CIRCUIT_TX: Final = Topic(
     "/wayside/{circuit}/track_code/feed_end",
@@ -51,18 +55,25 @@ OCCUPANCY: Final = Topic(
     ESTIMATE,
     Table,
     "track_code_transmitter",
-    "the track_code_transmitters behind",
-    "Whether the circuit is occupied, from the level that arrives at its end.",
+    "the track_code_transmitters behind and ahead",
+    "Whether the circuit is occupied: clear only where its own code is recognised at its level, "
+    "and no train that came in sequence is missing.",
     table=(
         Column(
             "occupied",
-            "1 if the circuit is occupied, or its level too low for another reason; else 0",
+            "1 if the circuit is occupied, or not proven clear for another reason; else 0",
         ),
         Column(
             "level_db",
-            "level at the receiving end in the band of the carrier, 0 dB being a wave of "
+            "level of the circuit's own code at the receiving end, 0 dB being a wave of "
             "amplitude 1; -300 or more",
         ),
+        Column("detected", "1 if the receiver does not recognise its own code at its level"),
+        Column(
+            "holds",
+            "1 if a train came in from the circuit behind and has not been seen to go on",
+        ),
+        Column("coherence", "part of the power in the band that is the circuit's own code, 0 to 1"),
     ),
 )
 CODE_SENT: Final = Topic(
@@ -103,8 +114,8 @@ CODE_RECEIVED: Final = Topic(
         Column("carrier_hz", "carrier in force, 0 if there is none"),
         Column(
             "valid",
-            "1 if the last word decided in the tick passed its check, else 0; the four fields "
-            "and the word are then 0",
+            "1 if the last word decided in the tick passed its check, on a carrier as strong as "
+            "one's own circuit gives at least; else 0, and so are the four fields and the word",
         ),
         Column("word", "the bits of the code as a number, the lowest tone least significant"),
         *_FIELDS,

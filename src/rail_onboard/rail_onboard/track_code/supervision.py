@@ -11,6 +11,13 @@ and never less than e, for which no braking is needed. The worst is assumed thro
 entrance was passed when the old carrier was last surely heard, the odometer counts too little, a
 fall adds to ``a``. In a new block the end speed of the old one holds until its first valid code.
 Where a localizer knows the train at both places, d is the most that its intervals allow instead.
+
+A code is obeyed only if it can come from the circuit under the train: its identity is that of the
+code before, or the next one after a change of carrier. Any other one counts as none. At a stand,
+once the code is overdue, any is taken - with its end speed, since the entrance is not known.
+
+Wheels that are not believed (`WheelCheck`) make the train brake to a stand, by the worst of its
+speed; it then runs by the most that physics allows until they are believed again.
 """
 
 from __future__ import annotations
@@ -20,98 +27,31 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, sqrt
 
-import numpy as np
-
 from rail_signals.track_code.scales import (
     GRAVITY_MPS2,
+    IDENTITIES,
     LEAST_BRAKING_MPS2,
     CodeScales,
     TrackCode,
     deceleration_mps2,
+    identity_after,
 )
+
+from .block_check import BlockCheck
+from .supervision_limits import TRIP_SPEEDS_300_KMH, Delays, Thresholds
+from .wheel_check import WheelCheck
+
+__all__ = [
+    "STANDSTILL_MPS",
+    "TRIP_SPEEDS_300_KMH",
+    "CodeSupervision",
+    "Delays",
+    "SupervisionOutput",
+    "Thresholds",
+]
 
 #: Slower than this a train stands.
 STANDSTILL_MPS = 0.05
-
-TRIP_SPEEDS_300_KMH = (
-    *((0.0, 35.0), (80.0, 90.0), (160.0, 170.0)),
-    *((220.0, 235.0), (270.0, 285.0), (300.0, 315.0)),
-)
-"""Speed allowed and speed that trips the emergency brake, of the 300 km/h family."""
-
-
-@dataclass(frozen=True)
-class Thresholds:
-    """When to warn, to brake and to release, against the permitted speed [m/s].
-
-    Parameters
-    ----------
-    warn_over_mps, service_over_mps, emergency_over_mps : float
-        Excess that makes each of them act, rising.
-    release_under_mps : float
-        The brake is released that far below the permitted speed, or at half of it.
-    trip_kmh : tuple of (float, float)
-        Permitted speed and speed that trips the emergency brake [km/h], rising; linear between
-        them; empty = ``emergency_over_mps`` everywhere.
-    """
-
-    warn_over_mps: float = 0.2
-    service_over_mps: float = 0.7
-    emergency_over_mps: float = 2.0
-    release_under_mps: float = 0.5
-    trip_kmh: tuple[tuple[float, float], ...] = ()
-
-    def __post_init__(self) -> None:
-        rising = (0.0, self.warn_over_mps, self.service_over_mps, self.emergency_over_mps, inf)
-        if list(rising) != sorted(rising) or not self.release_under_mps >= 0.0:
-            raise ValueError(f"thresholds: {rising[1:4]} do not rise from 0")
-        flat = [speed for pair in self.trip_kmh for speed in pair]
-        if flat[::2] != sorted(set(flat[::2])) or any(t < s for s, t in self.trip_kmh):
-            raise ValueError(f"trip_kmh: {self.trip_kmh} do not rise")
-
-    def emergency_mps(self, permitted_mps: float) -> float:
-        """Speed that trips the emergency brake."""
-        if not self.trip_kmh:
-            return permitted_mps + self.emergency_over_mps
-        speed_kmh = 3.6 * permitted_mps
-        speeds = [speed for speed, _ in self.trip_kmh]
-        trips = [trip for _, trip in self.trip_kmh]
-        above_kmh = max(0.0, speed_kmh - speeds[-1])
-        trip_kmh = float(np.interp(speed_kmh, speeds, trips)) + above_kmh
-        return trip_kmh / 3.6
-
-
-@dataclass(frozen=True)
-class Delays:
-    """What takes time, at the worst.
-
-    Parameters
-    ----------
-    window_s, confirmation_s : float
-        Of the receiver; together its response time, after which no code is no excuse.
-    notice_s : float
-        By how much a change of carrier is noticed late.
-    brake_s : float
-        From a demand until the brake has its full force, the time of a tick included.
-    traction_mps2 : float
-        Acceleration that may go on until then, on level track.
-    """
-
-    window_s: float = 1.5625
-    confirmation_s: float = 1.0
-    notice_s: float = 0.3
-    brake_s: float = 1.0
-    traction_mps2: float = 0.5
-
-    def __post_init__(self) -> None:
-        values = (self.window_s, self.confirmation_s, self.notice_s, self.brake_s)
-        if not min(*values, self.traction_mps2) >= 0.0:
-            raise ValueError(f"delays: {values}, {self.traction_mps2}: must not be negative")
-
-    @property
-    def response_s(self) -> float:
-        """Response time of the receiver."""
-        return self.window_s + self.confirmation_s
 
 
 @dataclass(frozen=True)
@@ -153,6 +93,8 @@ class CodeSupervision:
     scales : CodeScales
     thresholds : Thresholds
     delays : Delays
+    wheels : WheelCheck, optional
+        Of the wheels that tell speed and way; None = they are believed.
 
     Raises
     ------
@@ -178,6 +120,7 @@ class CodeSupervision:
         scales: CodeScales | None = None,
         thresholds: Thresholds | None = None,
         delays: Delays | None = None,
+        wheels: WheelCheck | None = None,
     ) -> None:
         if not 0.0 < guaranteed_service_mps2 < inf:
             raise ValueError(f"braking_mps2: {guaranteed_service_mps2} is not above zero")
@@ -187,11 +130,19 @@ class CodeSupervision:
         self._scales = scales or CodeScales()
         self._thresholds = thresholds or Thresholds()
         self._delays = delays or Delays()
+        self._wheels = wheels
+        self._blocks = BlockCheck(self._delays.notice_s, odometer_error)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything, as when switched on: the train may not move."""
         self._time_s = -inf
+        if self._wheels is not None:
+            self._wheels.reset()
+        self._blocks.reset()
+        self._identity = 0  # of the circuit whose code is in force; 0 = not known
+        self._doubted = self._were_doubted = False  # whether the wheels are not believed
+        self._proving = False  # braking to a stand, because the wheels are not believed
         self._code: TrackCode | None = None
         self._code_s = -inf  # when it was last valid, or its successor was due
         self._carrier_hz: float | None = None
@@ -242,11 +193,14 @@ class CodeSupervision:
             self._service = self._emergency = True
             return SupervisionOutput(0.0, True, True, True, "no odometer")
         speed_mps = abs(speed_mps)
-        fastest = speed_mps if fastest_mps is None else fastest_mps
-        place = _OdometerPlace(distance_m, located_m)
-        self._follow(time_s, place, speed_mps, carrier_hz)
+        self._blocks.run_to(distance_m, speed_mps)
+        fastest, most_m = self._by_physics(time_s, distance_m, speed_mps, fastest_mps)
+        place = _OdometerPlace(most_m, located_m)
+        self._follow(time_s, place, fastest, carrier_hz)
         if fields is not None and carrier_hz is not None:
-            self._take(time_s, self._scales.read(fields))
+            identity = fields.get("network", 0)
+            if self._can_be_of_this_circuit(identity, stands=fastest <= STANDSTILL_MPS):
+                self._take(time_s, self._scales.read(fields), identity)
         lost = self._overdue(time_s)
         permitted_mps = self._permitted_mps(place)
         if not lost:
@@ -255,19 +209,46 @@ class CodeSupervision:
             if self._lost is None:
                 self._lost = time_s, fastest
             permitted_mps = min(permitted_mps, self._stopping_mps(time_s))
-        return self._judge(fastest, speed_mps <= STANDSTILL_MPS, permitted_mps, lost=lost)
+        stands = speed_mps <= STANDSTILL_MPS and (
+            fastest_mps is not None or fastest <= STANDSTILL_MPS
+        )
+        return self._judge(fastest, stands, permitted_mps, lost=lost)
+
+    def _by_physics(
+        self, time_s: float, distance_m: float, speed_mps: float, located_mps: float | None
+    ) -> tuple[float, float]:
+        """The fastest that the train may run, and the most of its way; by a localizer's speed."""
+        wheels = self._wheels
+        if wheels is None:
+            return (speed_mps if located_mps is None else located_mps), distance_m
+        gradient_permil = self._code.gradient_permil if self._code else 0.0
+        guaranteed = max(0.0, deceleration_mps2(self._braking_mps2, min(0.0, gradient_permil)))
+        fastest = wheels.update(
+            time_s,
+            distance_m,
+            speed_mps,
+            braked=self._service or self._emergency,
+            guaranteed_mps2=guaranteed,
+        )
+        self._were_doubted = self._doubted
+        self._doubted = located_mps is None and not wheels.trusted
+        if located_mps is not None:
+            return located_mps, wheels.run_m
+        return fastest, wheels.run_m
 
     def _follow(
         self, time_s: float, place: _OdometerPlace, speed_mps: float, carrier_hz: float | None
     ) -> None:
         """Notice the entrance of a block by its carrier."""
         if carrier_hz is None:
+            self._blocks.reset()  # an entrance may go by unnoticed
             return
         if self._carrier_hz is not None and carrier_hz != self._carrier_hz:
             entry = self._before[0][1]
             # A block is at least as long as coded: a change before that, or a second one
             # without a code, is crosstalk, and then no entrance is known.
-            believed = not self._awaiting and self._left_m(place) <= 0.0
+            trusted = self._wheels is None or self._wheels.trusted
+            believed = trusted and not self._awaiting and self._left_m(place) <= 0.0
             if believed and self._code is not None and self._code.end_mps <= 0.0:
                 self._passed_stop |= speed_mps > STANDSTILL_MPS
             self._entry = entry if believed else None
@@ -275,20 +256,47 @@ class CodeSupervision:
                 # The new code is given its time once: flicker must not put it off indefinitely.
                 self._code_s = time_s
             self._awaiting = True
+            self._blocks.enter()
             self._before.clear()
         self._carrier_hz = carrier_hz
         self._before.append((time_s, place))
         while len(self._before) > 1 and self._before[1][0] <= time_s - self._delays.notice_s:
             self._before.popleft()
 
-    def _take(self, time_s: float, code: TrackCode) -> None:
+    def _can_be_of_this_circuit(self, identity: int, *, stands: bool) -> bool:
+        """Whether a code of this identity can come from the circuit under the train."""
+        if identity not in IDENTITIES or self._identity == 0:
+            return True  # no identity is told, or nothing is known
+        if identity == self._identity:
+            return True
+        if self._awaiting and identity == identity_after(self._identity):
+            return True
+        return stands and self._overdue(self._time_s)
+
+    def _take(self, time_s: float, code: TrackCode, identity: int) -> None:
         """Obey a valid code."""
-        old = self._code
+        old, new_block = self._code, self._awaiting
         if old is not None and not self._awaiting:
             same = (code.length_m, code.gradient_permil) == (old.length_m, old.gradient_permil)
             # Another block without a change of carrier: two entrances went by unnoticed.
-            self._entry = self._entry if same else None
+            self._entry = self._entry if same and identity == self._identity else None
+        if new_block:
+            follows = self._identity != 0 and identity == identity_after(self._identity)
+            self._check_wheels(self._blocks.leave(old.length_m if old else 0.0, follows=follows))
+        self._identity = identity if identity in IDENTITIES else 0
         self._code, self._code_s, self._awaiting = code, time_s, False
+
+    def _check_wheels(self, ratio: float | None) -> None:
+        """Believe the wheels or do not, by the block that was left."""
+        wheels, code = self._wheels, self._code
+        if wheels is None or ratio is None or code is None:
+            return
+        if ratio >= 1.0:
+            wheels.trust()
+        else:
+            wheels.doubt(
+                max(wheels.fastest_from_stand_mps(code.length_m), wheels.speed_mps / ratio)
+            )
 
     def _overdue(self, time_s: float) -> bool:
         """Whether there has been no valid code for longer than the receiver needs."""
@@ -332,10 +340,14 @@ class CodeSupervision:
     ) -> SupervisionOutput:
         """Warn, brake or release."""
         limits = self._thresholds
+        if not self._doubted or speed_mps <= 0.0:
+            self._proving = False
+        elif speed_mps > permitted_mps or not self._were_doubted:
+            self._proving = True
         too_fast = speed_mps > permitted_mps + limits.service_over_mps
         stop = permitted_mps <= 0.0
         below = max(permitted_mps - limits.release_under_mps, 0.5 * permitted_mps)
-        if lost or stop or too_fast:
+        if lost or stop or too_fast or self._proving:
             self._service = True
         elif speed_mps <= below:
             if stands:
@@ -352,6 +364,8 @@ class CodeSupervision:
                 reason = "stop passed"
             elif stop:
                 reason = "stop"
+            elif self._proving:
+                reason = "wheels not believed"
         return SupervisionOutput(
             permitted_mps,
             self._service or speed_mps > permitted_mps + limits.warn_over_mps,

@@ -21,8 +21,10 @@ from rail_msgs_py.topics.track_code import CODE_RECEIVED
 from rail_msgs_py.topics.world import COMMAND, ODOMETER
 from rail_msgs_py.track_code import quantities
 from rail_onboard.localizer.protected_interval import protected_interval
+from rail_signals.track_code.scales import CodeScales
 
 from .supervision import CodeSupervision
+from .wheel_check import WheelCheck
 
 _FIELDS = ("speed", "gradient", "block_length", "network")
 
@@ -33,6 +35,13 @@ class CodeSupervisionParameters:
 
     braking_mps2: float = quantities.BRAKING.parameter()
     odometer_error: float = ALLOWED_ODOMETER_ERROR.parameter()
+    most_braking_mps2: float = parameter(
+        2.5, "the most that the train can slow down", unit="m/s^2", low=0.1, high=20.0
+    )
+    most_traction_mps2: float = parameter(
+        1.5, "the most that the train can gather, downhill", unit="m/s^2", low=0.1, high=20.0
+    )
+    speeds_kmh: tuple[float, ...] = quantities.SPEEDS.parameter()
     localizer: bool = parameter(
         False, "whether a localizer tells place and speed; where it knows none, the odometer does"
     )
@@ -62,7 +71,13 @@ class CodeSupervisionNode(
     def start_over(self) -> None:
         """Have received no code."""
         self._supervision = CodeSupervision(
-            guaranteed_service_mps2=self._p.braking_mps2, odometer_error=self._p.odometer_error
+            guaranteed_service_mps2=self._p.braking_mps2,
+            odometer_error=self._p.odometer_error,
+            scales=CodeScales(speeds_kmh=self._p.speeds_kmh),
+            wheels=WheelCheck(
+                most_braking_mps2=self._p.most_braking_mps2,
+                most_traction_mps2=self._p.most_traction_mps2,
+            ),
         )
 
     def on_tick(self, stamp_ns: int, items: dict[str, Any]) -> None:

@@ -28,6 +28,22 @@ with the default braking, up to 100 km/h on blocks of 500 m. No code leads over 
 """
 
 
+#: Identities of circuits, in turn along a track. Two bits at least: with them no word is near to a
+#: line of the spectrum. No circuit has that of the one after the next, which has its carrier again.
+IDENTITIES = (3, 5, 6, 7)
+
+
+def identity_after(identity: int) -> int:
+    """Identity of the next circuit.
+
+    Examples
+    --------
+    >>> [identity_after(each) for each in IDENTITIES]
+    [5, 6, 7, 3]
+    """
+    return IDENTITIES[(IDENTITIES.index(identity) + 1) % len(IDENTITIES)]
+
+
 @dataclass(frozen=True)
 class TrackCode:
     """A code in SI units: speeds now and at the end, length and gradient of the block."""

@@ -168,14 +168,27 @@ class CodeLogic:
 
     def _entry_limit_mps(self, index: int, end_mps: float) -> float:
         """Largest speed at the entrance from which ``end_mps`` is reached at the end."""
-        b = self._braking_mps2[index]
-        if b < LEAST_BRAKING_MPS2:
-            return end_mps
-        t, w = self._reaction_s, self._overspeed_mps
         length_m = self._lengths[index] * self.scales.length_step_m
-        # u = v + w solves (u - w) T + (u^2 - e^2) / (2 b) = L.
-        u = -b * t + sqrt((b * t) ** 2 + end_mps**2 + 2.0 * b * (length_m + w * t))
-        return max(end_mps, u - w)
+        b = self._braking_mps2[index]
+        return entry_limit_mps(length_m, b, end_mps, self._reaction_s, self._overspeed_mps)
+
+
+def entry_limit_mps(
+    length_m: float, braking_mps2: float, end_mps: float, reaction_s: float, overspeed_mps: float
+) -> float:
+    """Largest speed at the entrance of a block from which ``end_mps`` is reached at its end.
+
+    Examples
+    --------
+    >>> round(3.6 * entry_limit_mps(500.0, 0.5, 0.0, 4.5, 1.7), 1)
+    67.3
+    """
+    b, t, w = braking_mps2, reaction_s, overspeed_mps
+    if b < LEAST_BRAKING_MPS2:
+        return end_mps
+    # u = v + w solves (u - w) T + (u^2 - e^2) / (2 b) = L.
+    u = -b * t + sqrt((b * t) ** 2 + end_mps**2 + 2.0 * b * (length_m + w * t))
+    return max(end_mps, u - w)
 
 
 def _under_trains(blocks: Sequence[Block], longest_train_m: float) -> list[Block]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -44,32 +44,59 @@ class Harmonic(Description):
     amplitude_v: Volts = Field(description="amplitude [V]")
 
 
+#: What each kind of fault befalls, and what it sets.
+_FAULTS: Final[dict[str, tuple[frozenset[str], frozenset[str]]]] = {
+    "sanding": (frozenset({"train", "loss_db"}), frozenset()),
+    "poor_shunt": (frozenset({"train", "shunt_ohm"}), frozenset()),
+    "broken_rail": (frozenset({"circuit", "loss_db"}), frozenset({"at_m"})),
+    "failed_joint": (frozenset({"circuit", "loss_db"}), frozenset()),
+    "wet_ballast": (frozenset({"track", "ballast_ohm_km"}), frozenset({"from_m", "to_m"})),
+    "dead_transmitter": (frozenset({"circuit"}), frozenset()),
+}
+
+
 class RailFault(Description):
     """Something that goes wrong in the rails, from and to a simulated time.
 
     ``sanding``: ``train`` picks up ``loss_db`` less of what flows in the rails.
+    ``poor_shunt``: the axles of ``train`` together have ``shunt_ohm`` from rail to rail.
     ``broken_rail``: what would pass ``at_m`` of ``circuit`` (its middle if not said) is
-    weaker by ``loss_db``. ``dead_transmitter``: that of ``circuit`` sends nothing.
+    weaker by ``loss_db``. ``failed_joint``: the joint at the exit end of ``circuit`` takes
+    ``loss_db`` only. ``wet_ballast``: from ``from_m`` to ``to_m`` of ``track`` the ballast
+    leaks. ``dead_transmitter``: that of ``circuit`` sends nothing.
     """
 
-    kind: Literal["sanding", "broken_rail", "dead_transmitter"]
+    kind: Literal[
+        "sanding",
+        "poor_shunt",
+        "broken_rail",
+        "failed_joint",
+        "wet_ballast",
+        "dead_transmitter",
+    ]
     from_s: Annotated[StrictFloat, range_of(FAULT_BEGIN)]
     to_s: Annotated[StrictFloat, range_of(FAULT_END)]
     train: str | None = None
     circuit: str | None = None
+    track: str | None = None
     at_m: Chainage | None = None
+    from_m: Chainage | None = None
+    to_m: Chainage | None = None
     loss_db: Annotated[StrictFloat, range_of(quantities.SANDING_LOSS)] | None = None
+    shunt_ohm: Annotated[StrictFloat, range_of(quantities.SHUNT)] | None = None
+    ballast_ohm_km: Annotated[StrictFloat, range_of(quantities.BALLAST)] | None = None
 
     @model_validator(mode="after")
-    def _names_its_place(self) -> RailFault:
-        if (self.train is None) == (self.kind == "sanding"):
-            raise ValueError(f"train: goes with sanding, and only with it, not {self.kind}")
-        if (self.circuit is None) != (self.kind == "sanding"):
-            raise ValueError(f"circuit: does not agree with {self.kind}")
-        if (self.loss_db is None) != (self.kind == "dead_transmitter"):
-            raise ValueError(f"loss_db: {self.loss_db} does not agree with {self.kind}")
-        if self.at_m is not None and self.kind != "broken_rail":
-            raise ValueError(f"at_m: goes with broken_rail only, not {self.kind}")
+    def _sets_what_its_kind_has(self) -> RailFault:
+        needed, possible = _FAULTS[self.kind]
+        for field in type(self).model_fields:
+            if field in ("kind", "from_s", "to_s"):
+                continue
+            value = getattr(self, field)
+            if (value is None and field in needed) or (
+                value is not None and field not in needed | possible
+            ):
+                raise ValueError(f"{field}: {value} does not agree with {self.kind}")
         return self
 
 
@@ -124,6 +151,8 @@ class RailDescription(Description):
         for fault in self.faults:
             if fault.train is not None and fault.train not in self.trains:
                 raise ValueError(f"faults: there is no train {fault.train}")
+            if fault.track is not None and fault.track not in self.track_order:
+                raise ValueError(f"faults: there is no track {fault.track}")
             if fault.circuit is not None and fault.circuit not in names:
                 raise ValueError(f"faults: there is no circuit {fault.circuit}")
             if fault.circuit is not None and fault.at_m is not None:

@@ -7,7 +7,9 @@ transmitter at ``e`` and a listener at ``x`` of the same track, in decibels,
 
 A train's antenna is ahead of its first axle: its own axles lie between it and all that is
 behind. ``broken_rail`` adds its loss to the paths that pass the break, ``sanding`` to all that
-the train hears from the rails.
+the train hears from the rails. ``failed_joint`` takes the loss of a joint away but for what is
+left, ``poor_shunt`` that of the axles of one train; ``wet_ballast`` attenuates more on its stretch
+(`rail_world.track_code.line_constants`).
 
 | symbol | meaning | unit |
 |---|---|---|
@@ -31,7 +33,8 @@ from scipy.sparse import csr_array
 from rail_signals.arrays import BoolArray, FloatArray
 from rail_world.line.description_base import whole_samples
 
-from .description import RailDescription
+from .description import RailDescription, RailFault
+from .line_constants import attenuation_db_per_km, shunt_loss_db
 from .noise import RealNoiseSource
 
 IntArray = NDArray[np.intp]
@@ -133,6 +136,7 @@ class RailMedium:
         self._track = track[self._order]
         self._start_m = start_m[self._order]
         self._end_m = np.array([circuit.end_m for circuit in circuits])[self._order]
+        self._carrier_hz = np.array([c.carrier_hz for c in circuits])[self._order]
         self._key_m = self._track * _TRACK_APART_M + self._start_m
         self._index = {circuit.name: index for index, circuit in enumerate(circuits)}
         self._train = {name: index for index, name in enumerate(description.trains)}
@@ -223,15 +227,29 @@ class RailMedium:
         low_m, high_m = np.minimum(x_m, from_m), np.maximum(x_m, from_m)
         loss_db = rails.attenuation_db_per_km * 1e-3 * (high_m - low_m)
         loss_db += rails.joint_attenuation_db * np.abs(_NEIGHBOURS)
+        carrier_hz = self._carrier_hz[source]
         between = self._trains_between(trains, self._track[own], low_m, high_m)
-        loss_db += rails.shunt_attenuation_db * between
+        shunts = self._shunts_db(time_s)
+        if shunts is None:
+            loss_db += rails.shunt_attenuation_db * np.count_nonzero(between, axis=-1)
+        else:
+            loss_db += between @ shunts
         circuit = self._order[source]
         for fault in rails.faults:
             if not fault.from_s <= time_s < fault.to_s:
                 continue
-            if fault.loss_db is None:  # a dead transmitter
+            if fault.kind == "dead_transmitter":
                 known &= circuit != self._index[str(fault.circuit)]
-            elif fault.kind == "broken_rail":
+            elif fault.kind == "failed_joint":
+                at = self._place[self._index[str(fault.circuit)]]
+                passes = (np.minimum(own[:, None], source) <= at) & (
+                    at < np.maximum(own[:, None], source)
+                )
+                gain_db = rails.joint_attenuation_db - float(fault.loss_db or 0.0)
+                loss_db -= np.where(passes, max(0.0, gain_db), 0.0)
+            elif fault.kind == "wet_ballast":
+                loss_db += self._wet_db(fault, own, low_m, high_m, carrier_hz)
+            elif fault.kind == "broken_rail" and fault.loss_db is not None:
                 at = self._place[self._index[str(fault.circuit)]]
                 middle_m = 0.5 * float(self._start_m[at] + self._end_m[at])
                 break_m = middle_m if fault.at_m is None else fault.at_m
@@ -258,8 +276,8 @@ class RailMedium:
     @staticmethod
     def _trains_between(
         trains: TrainsOnRails, track: IntArray, low_m: FloatArray, high_m: FloatArray
-    ) -> IntArray:
-        """Number of trains [listener, path] with axles between ``low_m`` and ``high_m``."""
+    ) -> BoolArray:
+        """Trains [listener, path, train] with axles between ``low_m`` and ``high_m``."""
         on = track[:, None, None]
         low, high = low_m[..., None], high_m[..., None]
         if trains.rear_track is None:
@@ -270,18 +288,58 @@ class RailMedium:
         # A train on two tracks fills the front's one from its start, the rear's to its end.
         rear_m = np.where(whole, trains.rear_m, -math.inf)
         axles = (trains.track == on) & (trains.front_m > low) & (rear_m < high)
-        axles = (axles | tail) & trains.on_line
-        found: IntArray = np.count_nonzero(axles, axis=-1).astype(np.intp)
-        return found
+        axles = np.asarray((axles | tail) & trains.on_line)
+        return axles
+
+    def _shunts_db(self, time_s: float) -> FloatArray | None:
+        """Loss past each train [train], None if all shunt as they should."""
+        rails = self.description
+        poor = [
+            fault
+            for fault in rails.faults
+            if fault.kind == "poor_shunt" and fault.from_s <= time_s < fault.to_s
+        ]
+        if not poor:
+            return None
+        shunts = np.full(len(rails.trains), rails.shunt_attenuation_db)
+        for fault in poor:
+            loss_db = shunt_loss_db(
+                fault.shunt_ohm or math.inf,
+                rails.attenuation_db_per_km,
+                float(self._carrier_hz.mean()),
+            )
+            at = self._train[str(fault.train)]
+            shunts[at] = min(shunts[at], loss_db)
+        return shunts
+
+    def _wet_db(
+        self,
+        fault: RailFault,
+        own: IntArray,
+        low_m: FloatArray,
+        high_m: FloatArray,
+        carrier_hz: FloatArray,
+    ) -> FloatArray:
+        """What paths [listener, path] lose more on a wet stretch."""
+        begin_m = fault.from_m or 0.0
+        end_m = math.inf if fault.to_m is None else fault.to_m
+        wet_m = np.minimum(high_m, end_m) - np.maximum(low_m, begin_m)
+        on_track = self._track[own] == self.description.track_order.index(str(fault.track))
+        wet_m = np.where(on_track[:, None], np.maximum(wet_m, 0.0), 0.0)
+        # The attenuation goes with the root of the frequency.
+        per_km = attenuation_db_per_km(fault.ballast_ohm_km or math.inf, 1.0) * np.sqrt(carrier_hz)
+        more = np.maximum(per_km - self.description.attenuation_db_per_km, 0.0)
+        lost: FloatArray = 1e-3 * more * wet_m
+        return lost
 
     def _sanding(self, time_s: float) -> FloatArray:
         """What sand between wheels and rails leaves of the signal [train]."""
         left = np.ones(len(self._train))
         for fault in self.description.faults:
-            if fault.train is None or fault.loss_db is None:
-                continue  # nothing that one train does
+            if fault.kind != "sanding" or fault.loss_db is None:
+                continue
             if fault.from_s <= time_s < fault.to_s:
-                left[self._train[fault.train]] *= 10.0 ** (fault.loss_db / -20.0)
+                left[self._train[str(fault.train)]] *= 10.0 ** (fault.loss_db / -20.0)
         return left
 
     def _harmonics(self, tick: int) -> FloatArray:

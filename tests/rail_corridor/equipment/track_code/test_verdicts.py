@@ -147,3 +147,44 @@ def test_a_block_that_is_entered_while_occupied_is_an_event() -> None:
     assert [event["at_m"] for event in events] == [600.0, 1100.0, 1600.0]
     assert {event["kind"] for event in events} == {"occupied block entered"}
     assert report["event_counts"]["occupied_block_entered"] == 3
+
+
+# Claims of circuits, and the code ---------------------------------------------------------
+
+
+def test_a_circuit_clear_over_a_train_counts_once_it_had_time_to_notice() -> None:
+    run = RunBuilder("follow_codes", 20).moves("leader", 1400.0).moves("follower", 100.0)
+    for name in run.circuits:
+        run.sensed(name, 0.0)
+    section = run.train("leader")["track_code"]
+    assert section["false_clear_s"] == section["clear_over_train_s"] == (20 - 6) * TICK_S
+    # Held in the circuit behind it, it is clear over the train and yet harmless.
+    section = run.sensed("tc2", 1.0).train("leader")["track_code"]
+    assert (section["false_clear_s"], section["clear_over_train_s"] > 0.0) == (0.0, True)
+
+
+def test_a_circuit_occupied_by_nobody_counts_for_the_train_before_it() -> None:
+    run = RunBuilder("follow_codes", 40).moves("leader", 3000.0).moves("follower", 100.0)
+    assert run.train("follower")["track_code"]["false_occupied_s"] == (40 - 14) * TICK_S
+    run.sensed("tc2", 0.0)
+    assert run.train("follower")["track_code"]["false_occupied_s"] == 0.0
+
+
+def test_running_above_the_code_without_a_brake_counts() -> None:
+    run = RunBuilder("follow_codes", 10).moves("follower", 100.0, 15.0)
+    assert run.commanded("follower", 20.0).train("follower")["atp"]["above_code_s"] == 0.0
+    assert run.commanded("follower", 10.0).train("follower")["atp"]["above_code_s"] == 10 * TICK_S
+    run.commanded("follower", 10.0, service_brake=1.0)
+    assert run.train("follower")["atp"]["above_code_s"] == 0.0
+
+
+def test_running_above_what_the_circuit_sends_counts_whatever_is_permitted() -> None:
+    run = RunBuilder("follow_codes", 10).moves("follower", 100.0, 15.0).sent("tc1", 100.0, 0x00)
+    assert run.train("follower")["atp"]["above_code_s"] == 10 * TICK_S
+
+
+def test_the_code_of_a_circuit_elsewhere_is_foreign() -> None:
+    run = RunBuilder("follow_codes", 40).moves("follower", 100.0, 10.0)
+    assert run.understood("follower", 100.0).train("follower")["atp"]["foreign_obeyed_s"] == 0.0
+    run.understood("follower", 101.0)
+    assert run.train("follower")["atp"]["foreign_obeyed_s"] == (40 - 17) * TICK_S

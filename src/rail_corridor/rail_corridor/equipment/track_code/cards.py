@@ -20,7 +20,7 @@ from rail_corridor.equipment.live_elements import (
 )
 from rail_corridor.equipment.live_state import LiveState
 from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT, OCCUPANCY
-from rail_signals.track_code.scales import CodeScales
+from rail_signals.track_code.scales import SPEEDS_KMH, CodeScales
 
 _ROW = "circuits"
 _HEADINGS = (
@@ -46,7 +46,7 @@ class TrackCodeView(LiveView):
             CODE_RECEIVED,
             "Track code on board",
             CardGroup.RECEPTION,
-            lambda _state, _train, row: code_rows(row),
+            lambda state, _train, row: code_rows(row, state.line),
         ),
     )
 
@@ -83,13 +83,14 @@ class TrackCodeView(LiveView):
         )
 
 
-def code_rows(row: Mapping[str, float]) -> Rows:
+def code_rows(row: Mapping[str, float], line: Mapping[str, Any]) -> Rows:
     """A track code in words: what the fields stand for."""
     if not row.get("valid", 1.0) > 0.0 or not math.isfinite(row.get("word", math.nan)):
         rows = [["code", "none that can be read", ""]]
     else:
         fields = {name: int(row[name]) for name in ("speed", "gradient", "block_length")}
-        code = CodeScales().read(fields)
+        speeds = tuple(line.get("code_speeds_kmh", ())) or SPEEDS_KMH
+        code = CodeScales(speeds_kmh=speeds).read(fields)
         rows = [
             ["permitted", f"{3.6 * code.now_mps:.0f}", "km/h"],
             ["at its end", f"{3.6 * code.end_mps:.0f}", "km/h"],
@@ -112,7 +113,7 @@ def _occupied(state: LiveState, circuit: str) -> bool | None:
 def _circuit_row(state: LiveState, circuit: str) -> tuple[tuple[str, str], ...]:
     level_db = state.row(OCCUPANCY.name(circuit=circuit)).get("level_db", math.nan)
     sent = state.row(CODE_SENT.name(circuit=circuit))
-    code = code_rows(sent) if sent else []
+    code = code_rows(sent, state.line) if sent else []
     fields = [(text, unit) for _, text, unit in code[:_FIELDS]] if len(code) >= _FIELDS else []
     occupied = _occupied(state, circuit)
     return (

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rail_corridor.scenario.model import Scenario
+from rail_signals.track_code.scales import IDENTITIES
 from rail_world.line.network import Network
 from rail_world.line.track import Track
 
@@ -20,9 +21,9 @@ class Circuit:
     """One track circuit.
 
     From ``start_m`` to ``end_m`` [m] of chainage; trains run towards ``end_m``, where the
-    transmitter stands. ``limit_mps`` is the lowest speed limit in it, ``gradient_permil`` the
-    steepest fall (negative: downhill in the running direction), both under any part of the longest
-    train whose front is in the circuit.
+    transmitter stands. ``identity`` is what its codes say of themselves. ``limit_mps`` is the
+    lowest speed limit in it, ``gradient_permil`` the steepest fall (negative: downhill in the
+    running direction), both under any part of the longest train whose front is in the circuit.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Circuit:
     start_m: float
     end_m: float
     carrier_hz: float
+    identity: int
     limit_mps: float
     gradient_permil: float
 
@@ -68,6 +70,7 @@ def place_circuits(
                     start_m,
                     end_m,
                     plan.carriers_hz[index % len(plan.carriers_hz)],
+                    IDENTITIES[index % len(IDENTITIES)],
                     *_worst(track, max(0.0, start_m - longest_train_m), end_m),
                 )
             )

@@ -19,10 +19,10 @@ from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT
 from rail_msgs_py.topics.world import STATE
 from rail_signals.arrays import FloatArray
 
+from .claims import OLDEST_S, circuit_claims, code_claims
 from .placement import circuits_of
 
-#: A valid message may be as old as the longest way through the receiver [s].
-OLDEST_S = 8.0
+__all__ = ["OLDEST_S", "circuit_of", "code_metrics", "code_table"]
 
 
 def code_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str, Any]:
@@ -35,9 +35,11 @@ def code_metrics(scenario: Scenario, recording: RunData, index: int) -> dict[str
     here = np.where(on_line, sent[np.arange(ticks), circuit], np.nan)
     received = recording[CODE_RECEIVED].upto(ticks)[:, index]
     return {
-        "track_code": _codes(scenario.tick_s, on_line, circuit, here, received),
+        "track_code": _codes(scenario.tick_s, on_line, circuit, here, received)
+        | circuit_claims(scenario, recording, index, on_line, circuit),
         "atp": supervision_metrics(scenario, recording, index, on_line)
-        | {"entered_occupied": _entered_occupied(scenario, recording, index, on_line, circuit)},
+        | {"entered_occupied": _entered_occupied(scenario, recording, index, on_line, circuit)}
+        | code_claims(scenario, recording, index, on_line, circuit),
     }
 
 
@@ -120,7 +122,18 @@ def code_table(trains: Mapping[str, Any]) -> Table | None:
         return None
     table = new_table(
         "codes understood, and supervision",
-        *("train", "codes", "wrong", "valid", "after s", "braked", "over s", "entered", "gap m"),
+        *(
+            "train",
+            "codes",
+            "wrong",
+            "valid",
+            "after s",
+            "braked",
+            "over s",
+            "above s",
+            "entered",
+            "gap m",
+        ),
     )
     for name, train in obeying.items():
         code, atp = train["track_code"], train["atp"]
@@ -133,6 +146,7 @@ def code_table(trains: Mapping[str, Any]) -> Table | None:
             "-" if code["latency_s"] is None else f"{code['latency_s']:.2f}",
             str(atp["interventions"]),
             f"{atp['overspeed_s']:.1f}",
+            f"{atp['above_code_s']:.1f}",
             str(atp["entered_occupied"]),
             "-" if margin_m is None else f"{margin_m:.0f}",
         )

@@ -12,7 +12,14 @@ from rail_corridor.scenario.section_fields import StrictInt
 from rail_msgs_py.quantities import CAB_SIGNALS, ODOMETER_ERROR
 from rail_msgs_py.track_code import quantities
 from rail_signals.track_code.profile import load_profile
-from rail_world.line.description_base import Description, Name, StrictFloat, field_of, range_of
+from rail_world.line.description_base import (
+    Chainage,
+    Description,
+    Name,
+    StrictFloat,
+    field_of,
+    range_of,
+)
 
 
 class TrackCircuitPlan(Description):
@@ -70,12 +77,58 @@ class Sanding(TimedFault):
     loss_db: StrictFloat = field_of(quantities.SANDING_LOSS)
 
 
+class BrokenRail(TimedFault):
+    """A rail that is broken: what would pass it is weaker."""
+
+    kind: Literal["broken_rail"]
+    circuit: Name = Field(description="its name: tc1, tc2, ... in the order of the tracks")
+    at_m: Chainage | None = Field(
+        default=None, description="chainage of the break; null = the middle of the circuit [m]"
+    )
+    loss_db: StrictFloat = field_of(quantities.BREAK_LOSS)
+
+
+class FailedJoint(TimedFault):
+    """The insulated joint at the exit end of a track circuit lets through what it should not."""
+
+    kind: Literal["failed_joint"]
+    circuit: Name = Field(description="the circuit before the joint")
+    loss_db: StrictFloat = field_of(quantities.JOINT_LEFT)
+
+
+class PoorShunt(TimedFault):
+    """Rust or leaves between the wheels of a train and the rails."""
+
+    kind: Literal["poor_shunt"]
+    train: Name = Field(description="the train")
+    shunt_ohm: StrictFloat = field_of(quantities.SHUNT)
+
+
+class WetBallast(TimedFault):
+    """Rain on a stretch of a track: the ballast leaks."""
+
+    kind: Literal["wet_ballast"]
+    track: Name = Field(description="the track")
+    from_m: Chainage = Field(default=0.0, description="where it begins [m]")
+    to_m: Chainage = Field(default=1e6, description="where it ends [m]")
+    ballast_ohm_km: StrictFloat = field_of(quantities.BALLAST)
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> WetBallast:
+        if self.to_m <= self.from_m:
+            raise ValueError(f"to_m: must be after from_m, {self.from_m:g} m")
+        return self
+
+
 class DeadTransmitter(TimedFault):
     """A track circuit that sends nothing."""
 
     kind: Literal["dead_transmitter"]
     circuit: Name = Field(description="its name: tc1, tc2, ... in the order of the tracks")
 
+
+#: Whatever goes wrong in the rails, and between them and the trains.
+RAIL_FAULTS: Final = (Sanding, BrokenRail, FailedJoint, PoorShunt, WetBallast, DeadTransmitter)
 
 TRACK_CIRCUITS: Final[Section[TrackCircuitPlan | None]] = Section(
     "track_circuits",

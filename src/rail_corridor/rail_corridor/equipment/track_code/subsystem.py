@@ -13,16 +13,17 @@ from rail_corridor.equipment.subsystem import PlanContext, Subsystem, Supervisio
 from rail_corridor.run_data import RecordSpec, RunData, per_train
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics import track_code as topics
-from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT
+from rail_msgs_py.topics.track_code import CODE_RECEIVED, CODE_SENT, OCCUPANCY
 from rail_msgs_py.topics.world import COMMAND, ODOMETER, STATE
 from rail_world.line.description_base import Description
 
 from .checks import check_codes
+from .line_speeds import allowed_kmh, speeds_of
 from .nodes import code_nodes
 from .placement import circuits_of
 from .report import code_metrics, code_table
 from .run_events import code_events
-from .section import TRACK_CIRCUITS, DeadTransmitter, Sanding
+from .section import RAIL_FAULTS, TRACK_CIRCUITS
 from .world import rails_of
 
 _SUPERVISION: Final = "code_supervision"
@@ -33,11 +34,14 @@ class TrackCodeSubsystem(Subsystem):
 
     name = "track_code"
     sections = (TRACK_CIRCUITS,)
-    faults = (Sanding, DeadTransmitter)
+    faults = RAIL_FAULTS
     hazards = (
         "trains.*.track_code.wrong",
         "trains.*.atp.entered_occupied",
         "trains.*.atp.overspeed_s",
+        "trains.*.atp.above_code_s",
+        "trains.*.atp.foreign_obeyed_s",
+        "trains.*.track_code.false_clear_s",
     )
     nodes = (
         NodeKind(
@@ -102,8 +106,9 @@ class TrackCodeSubsystem(Subsystem):
         return {} if rails is None else {"track_code": rails}
 
     def announcement(self, scenario: Scenario) -> Mapping[str, Any]:
-        """Circuits."""
+        """Circuits, and the speeds that their codes can tell."""
         return {
+            "code_speeds_kmh": speeds_of(scenario),
             "circuits": [
                 {
                     "name": circuit.name,
@@ -113,7 +118,7 @@ class TrackCodeSubsystem(Subsystem):
                     "carrier_hz": circuit.carrier_hz,
                 }
                 for circuit in circuits_of(scenario)
-            ]
+            ],
         }
 
     def summary(self, scenario: Scenario) -> Iterable[RenderableType]:
@@ -125,6 +130,7 @@ class TrackCodeSubsystem(Subsystem):
                 f"{len(circuits)} track circuits up to {longest_m:.0f} m, "
                 f"{circuits[0].name} ... {circuits[-1].name}; trains obey their codes"
             )
+        yield from slow_blocks(scenario)
 
     def records(self, scenario: Scenario) -> Sequence[RecordSpec]:
         """Codes sent and understood, and what supervision commanded."""
@@ -136,6 +142,7 @@ class TrackCodeSubsystem(Subsystem):
             RecordSpec(CODE_RECEIVED, per_train(names)),
             RecordSpec(COMMAND, per_train(names, supervision=_SUPERVISION)),
             RecordSpec(CODE_SENT, circuits, estimated=False, awaited=False),
+            RecordSpec(OCCUPANCY, circuits, estimated=False, awaited=False),
         )
 
     def train_report(self, scenario: Scenario, data: RunData, train: int) -> dict[str, Any]:
@@ -157,6 +164,26 @@ class TrackCodeSubsystem(Subsystem):
         from .cards import TrackCodeView  # wanted by the live page only
 
         return TrackCodeView()
+
+
+def slow_blocks(scenario: Scenario) -> Iterable[str]:
+    """What codes allow, where it is less than the limit."""
+    plan, circuits = TRACK_CIRCUITS.of(scenario), circuits_of(scenario)
+    if plan is None:
+        return
+    speeds = speeds_of(scenario)
+    slow: dict[tuple[float, float, float], list[str]] = {}
+    allowed = allowed_kmh(circuits, plan.braking_mps2, speeds)
+    for circuit in circuits:
+        limit_kmh = 3.6 * circuit.limit_mps
+        if allowed[circuit.name] < limit_kmh - 1e-6:
+            key = (round(circuit.length_m, 1), allowed[circuit.name], round(limit_kmh, 1))
+            slow.setdefault(key, []).append(circuit.name)
+    for (length_m, kmh, limit_kmh), names in slow.items():
+        yield (
+            f"blocks of {length_m:.0f} m allow {kmh:g} km/h of {limit_kmh:g}: {names[0]}"
+            + (f" and {len(names) - 1} more" if names[1:] else "")
+        )
 
 
 TRACK_CODE: Final = TrackCodeSubsystem()

@@ -8,7 +8,7 @@ from rail_corridor.scenario.model import Scenario
 from rail_world.track_code.description import Harmonic, RailDescription, RailFault, TrackCircuit
 
 from .placement import circuits_of
-from .section import TRACK_CIRCUITS, DeadTransmitter, Sanding
+from .section import RAIL_FAULTS, TRACK_CIRCUITS
 
 
 def rails_of(scenario: Scenario) -> RailDescription | None:
@@ -18,7 +18,7 @@ def rails_of(scenario: Scenario) -> RailDescription | None:
         return None
     # A wave of amplitude 1 over the noise in 300 Hz.
     noise_v = math.sqrt(0.5 * plan.sample_rate_hz / 600.0) * 10.0 ** (-plan.snr_db / 20.0)
-    faults = [f for f in scenario.faults if isinstance(f, Sanding | DeadTransmitter)]
+    faults = [f for f in scenario.faults if isinstance(f, RAIL_FAULTS)]
     return RailDescription(
         circuits=tuple(
             TrackCircuit(

@@ -35,7 +35,8 @@ TIMEOUT_S = 3.0
 def given(tmp_path: Path) -> dict[str, Any]:
     plan: Plan = make_plan(load_scenario("moving_block"), tmp_path)
     (spec,) = (spec for spec in plan.nodes if spec.name == NAME)
-    return dict(spec.parameters)
+    # A report in every tick: what it says is asked for, not when.
+    return dict(spec.parameters) | {"report_period_s": 0.05}
 
 
 def last(box: list[Any]) -> dict[str, float]:
@@ -378,7 +379,7 @@ def test_a_place_too_wide_for_a_report_is_reported_as_not_known(graph: Any, give
         ({"secret": "no digits"}, "atp: "),
         ({"secret": "00"}, "atp: secret"),
         ({"emergency_mps2": 0.1}, "atp: emergency_mps2"),
-        ({"steepest_fall_permil": 90.0}, "atp: fall_permil"),
+        ({"gradient_permil": (-90.0,)}, "atp: fall_permil"),
         ({"authority_timeout_s": math.nan}, "authority_timeout_s"),
     ],
 )

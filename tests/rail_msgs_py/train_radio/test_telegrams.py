@@ -206,10 +206,19 @@ def test_bits_that_mean_nothing_are_refused() -> None:
     with pytest.raises(ValueError, match="flags 0x17"):
         LocationReport.from_bytes(bytes(raw))
     raw = bytearray(AUTHORITY.to_bytes())
-    raw[-1] = 1
+    raw[12] |= 64
     with pytest.raises(ValueError, match="not a movement authority"):
         MovementAuthority.from_bytes(bytes(raw))
     with pytest.raises(ValueError, match="32 bytes, got 31"):
         MovementAuthority.from_bytes(bytes(31))
     with pytest.raises(ValueError, match="16 bytes, got 0"):
         LocationReport.from_bytes(b"")
+
+
+@pytest.mark.parametrize(("overlap_m", "told_m"), [(0.0, 0.0), (10.4, 10.0), (900.0, 127.5)])
+def test_an_overlap_is_told_no_longer_than_it_is(overlap_m: float, told_m: float) -> None:
+    authority = MovementAuthority(
+        7, 2, 1, 100.0, 20.0, 3.0, overlap_m=overlap_m, release=overlap_m > 0.0
+    )
+    read = MovementAuthority.from_bytes(authority.to_bytes())
+    assert (read.overlap_m, read.release) == (told_m, overlap_m > 0.0)

@@ -22,6 +22,7 @@ from rail_wayside.train_radio.moving_block import (
     Trouble,
     to_telegram,
 )
+from rail_wayside.train_radio.speed_profile import SpeedRestriction
 
 LENGTH_M, LIMIT_MPS, TRAIN_M = 5000.0, 20.0, 100.0
 MARGIN_M, END_MARGIN_M = 10.0, 20.0
@@ -614,3 +615,19 @@ def test_for_a_train_that_leaves_the_track_does_not_end_and_for_others_it_does()
     assert given_to(block, 2, 0.0).end_m < 3000.0 - TRAIN_M
     block.remove(1)
     assert given_to(block, 2, 1.0).end_m == LENGTH_M - END_MARGIN_M
+
+
+def test_a_temporary_restriction_is_told_while_it_holds() -> None:
+    track = Segment(1, "up", 5000.0, ((0.0, 20.0),))
+    block = MovingBlock(
+        [track],
+        [TrainStart(7, "T7", 100.0, 1, 1, 500.0)],
+        end_margin_m=0.0,
+        buffer_m=30.0,
+        restrictions=[SpeedRestriction(1, 1000.0, 1500.0, 8.0, 10.0, 60.0)],
+    )
+    for time_s, expected in ((5.0, []), (10.0, [8.0, 20.0]), (59.0, [8.0, 20.0]), (60.0, [])):
+        authority = block.authority(7, time_s)
+        assert authority is not None
+        assert [step.limit_mps for step in authority.steps] == expected
+        assert (authority.overlap_m, authority.release) == (30.0, True)

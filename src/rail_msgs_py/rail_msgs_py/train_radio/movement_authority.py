@@ -11,17 +11,19 @@ offset bytes field                                                          reso
 8      2     limit                                                          0.01 m/s
 10     2     validity                                                       0.01 s
 12     1     flags: 1 towards greater chainages, 2 emergency stop; bits 2-3
-             the number of steps; 16 located; the others are zero
+             the number of steps; 16 located; 32 release; the others are
+             zero
 13     12    two steps of the limit: from, signed (4), limit (2);           0.01 m,
              those not used are zero                                        0.01 m/s
 25     4     where the front was ranged to be, signed                       0.01 m
 29     2     half-width of that interval; both zero if not located          0.1 m
-31     1     zero
+31     1     overlap, from the end to the danger point                      0.5 m
 ====== ===== ============================================================== ==========
 
 Who reads an authority never believes it to reach further, to allow more or to last longer than
 who wrote it: the end is rounded towards the train, limits and validity down; a step to a lower
 limit begins earlier, one to a higher limit later. The half-width covers the rounding of the place.
+The overlap is rounded down, and counts from the end as it was rounded.
 """
 
 from __future__ import annotations
@@ -37,18 +39,22 @@ FASTEST_MPS: Final = 200.0
 LONGEST_S: Final = 600.0
 MOST_STEPS: Final = 2
 WIDEST_M: Final = 6553.5
+#: Longest overlap that can be told; a longer one counts as this.
+LONGEST_OVERLAP_M: Final = 127.5
 
 PER_METRE: Final = 100
 PER_METRE_COARSE: Final = 10
 PER_MPS: Final = 100
 PER_SECOND: Final = 100
+PER_METRE_OF_OVERLAP: Final = 2
 
 _HEAD = struct.Struct(">HHiHHB")
 _STEP = struct.Struct(">iH")
 _LOCATED = struct.Struct(">iH")
 _LOCATED_AT = _HEAD.size + MOST_STEPS * _STEP.size
 AUTHORITY_BYTES: Final = 32
-_FORWARD, _STOP, _COUNT_SHIFT, _KNOWN = 1, 2, 2, 16
+_OVERLAP_AT = 31
+_FORWARD, _STOP, _COUNT_SHIFT, _KNOWN, _RELEASE = 1, 2, 2, 16, 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +101,10 @@ class MovementAuthority:
     located : (float, float), optional
         Where the front was at the time-stamp of the frame, by phase ranging, and the half-width of
         that interval at the integrity that the scenario states, 0 to 6553.5 [m].
+    overlap_m : float
+        From the end of authority to the danger point, 0 to 1e6; told up to 127.5.
+    release : bool
+        Whether the train may come to the end at a release speed, which it works out itself.
 
     Raises
     ------
@@ -117,6 +127,8 @@ class MovementAuthority:
     steps: tuple[LimitStep, ...] = ()
     emergency_stop: bool = False
     located: tuple[float, float] | None = None
+    overlap_m: float = 0.0
+    release: bool = False
 
     def __post_init__(self) -> None:
         """Check the ranges and the order of the steps."""
@@ -126,6 +138,7 @@ class MovementAuthority:
         check_number("end_of_authority_m", self.end_of_authority_m, -FURTHEST_M, FURTHEST_M)
         check_number("limit_mps", self.limit_mps, 0.0, FASTEST_MPS)
         check_number("validity_s", self.validity_s, 0.0, LONGEST_S)
+        check_number("overlap_m", self.overlap_m, 0.0, FURTHEST_M)
         if self.located is not None:
             check_number("located", self.located[0], -FURTHEST_M, FURTHEST_M)
             check_number("located", self.located[1], 0.0, WIDEST_M)
@@ -153,7 +166,7 @@ class MovementAuthority:
         flags = len(steps) << _COUNT_SHIFT
         flags |= (_FORWARD if self.direction > 0 else 0) | (_STOP if self.emergency_stop else 0)
         located = self._located_on_the_wire()
-        flags |= _KNOWN if located else 0
+        flags |= (_KNOWN if located else 0) | (_RELEASE if self.release else 0)
         head = _HEAD.pack(
             self.train,
             self.segment,
@@ -163,7 +176,8 @@ class MovementAuthority:
             flags,
         )
         body = (head + b"".join(_STEP.pack(*step) for step in steps)).ljust(_LOCATED_AT, b"\0")
-        return (body + _LOCATED.pack(*(located or (0, 0)))).ljust(AUTHORITY_BYTES, b"\0")
+        overlap = down(min(self.overlap_m, LONGEST_OVERLAP_M), PER_METRE_OF_OVERLAP)
+        return body + _LOCATED.pack(*(located or (0, 0))) + bytes([overlap])
 
     def _located_on_the_wire(self) -> tuple[int, int] | None:
         if self.located is None:
@@ -204,8 +218,8 @@ class MovementAuthority:
         count = flags >> _COUNT_SHIFT & 3
         used = _HEAD.size + min(count, MOST_STEPS) * _STEP.size
         known = bool(flags & _KNOWN)
-        unused = raw[used:_LOCATED_AT] + (raw[-1:] if known else raw[_LOCATED_AT:])
-        if count > MOST_STEPS or flags >= 2 * _KNOWN or any(unused):
+        unused = raw[used:_LOCATED_AT] + (b"" if known else raw[_LOCATED_AT:_OVERLAP_AT])
+        if count > MOST_STEPS or flags >= 2 * _RELEASE or any(unused):
             raise ValueError(f"not a movement authority: {count} steps, rest {raw[used:].hex()}")
         steps = (_STEP.unpack_from(raw, at) for at in range(_HEAD.size, used, _STEP.size))
         return cls(
@@ -218,6 +232,8 @@ class MovementAuthority:
             tuple(LimitStep(place / PER_METRE, mps / PER_MPS) for place, mps in steps),
             bool(flags & _STOP),
             _located_of(raw) if known else None,
+            raw[_OVERLAP_AT] / PER_METRE_OF_OVERLAP,
+            bool(flags & _RELEASE),
         )
 
 

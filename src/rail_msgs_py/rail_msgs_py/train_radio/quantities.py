@@ -60,6 +60,32 @@ EMERGENCY_BRAKING: Final = Quantity(
     0.9, "guaranteed emergency brake rate (GEBR)", unit="m/s^2", low=0.1, high=3.0
 )
 MARGIN: Final = Quantity(10.0, "kept behind a train ahead", unit="m", low=0.0, high=1000.0)
+BUFFER: Final = Quantity(
+    60.0, "from the end of a track to the buffer, the danger point", unit="m", low=0.0, high=1000.0
+)
+REPORT_PERIOD: Final = Quantity(
+    0.5, "from location report to location report; at least a tick", unit="s", low=0.05, high=5.0
+)
+AUTHORITY_PERIOD: Final = Quantity(
+    0.5, "from authority to authority of a train; at least a tick", unit="s", low=0.05, high=5.0
+)
+ATP_CYCLE: Final = Quantity(
+    1.0,
+    "from one measurement of the speed on board to the next, and from there to the command in "
+    "force; at least a tick",
+    unit="s",
+    low=0.05,
+    high=5.0,
+)
+BRAKE_CONFIDENCE: Final = Quantity(
+    0.9,
+    "guaranteed brake rate over that of a train in good order, on dry rails (Kdry)",
+    low=0.1,
+    high=1.0,
+)
+BRAKE_ADHESION: Final = Quantity(
+    0.9, "brake rate on wet rails over that on dry ones (Kwet)", low=0.1, high=1.0
+)
 AUTHORITY_TIMEOUT: Final = Quantity(
     3.0, "age of an authority that makes a train brake", unit="s", low=0.5, high=60.0
 )

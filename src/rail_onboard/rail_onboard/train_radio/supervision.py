@@ -1,94 +1,53 @@
 """Supervision of a train by the movement authorities that it is told over the radio.
 
-All places are s, the chainage times the direction of travel. The front is at most at f, the end
-of the location's interval, and the rear at least at r, its start less the length of the train. An
-authority reaches to E. With D the stopping distance of ``braking_curve``, D_E that of the emergency
-brake, and m the excess ``service_over_mps``, the permitted speed P is the least of
+The curves are those of `authority_curves`, with its symbols: the front is from l to f, the rear at
+least at r, the authority ends at E, the danger point is S, P is the permitted speed, SBI and EBI
+are the speeds at which the brakes are demanded.
 
-- the limits in force from r to f;
-- for each lower limit e ahead, at s: max(e, v - m) with D(v, e) = s - f;
-- for the end: v - m with D(v) = (E - margin - f) + D(m).
+**P is continuous in f up to the end and 0 from E - margin on**; with a release speed it stays there
+until l is at E. Along a curve to a foot the train has D(v + m) + v t_d left, so its slope at the
+end is 1 / (D'(m) + t_d), and who keeps to it, no later than a part of that, comes up to it ever
+more slowly and not beyond. At ``STANDSTILL_MPS`` he counts as standing and is held by the brake.
 
-**P is continuous in f up to the end and 0 from E - margin on.** There D(v) = D(m), so v = m. It
-falls off with the slope 1 / D'(m), so a driver who keeps to it, no later than D'(m) / 2.72, comes
-up to E - margin ever more slowly and not beyond. At ``STANDSTILL_MPS`` he counts as standing and is
-held by the brake: f is then within D(m + STANDSTILL_MPS) - D(m) before E - margin, and the front
-at most twice the uncertainty behind f.
+**The emergency brake alone keeps the train before S, as long as there is a position.** It is
+demanded by the first measurement of v > EBI of a train that moves; at the one before, the way with
+every delay and every error of the speed at its worst ended before S, and the front was not beyond
+f. It is then held until the train, at a stand, may start again. So it does if l passes E on a
+release speed: f is then no further than where that speed was computed for.
 
-**The service brake alone keeps the train before E.** It is demanded at the latest by the first
-measurement of v > P + m, or without a position or a fresh authority. At the one before, D(v) <=
-D(P + m) <= (E - margin - f) + D(m) <= E - f, as a margin below D(m) is refused. D holds the worst
-that can happen from there on, the time to this measurement included; and the front was not beyond
-f. The brake is released below P only.
+**So does the service brake alone**, demanded at the latest by the first measurement of v > SBI, or
+without a position or a fresh authority; released below P only. Without a release speed it keeps
+the train before E', which is E with a margin of at least D(m), and never beyond S.
 
-**So does the emergency brake alone, as long as there is a position.** It is demanded by the first
-measurement of D_E(v) > E - f of a train that moves, and then held until that train, at a stand,
-may start again. The same argument holds. (A train that stands of itself is held by the service
-brake; how near the end is no violation.) As D_E <= D it never acts on a train that keeps to P + m.
+**No limit is exceeded, from r to f, by more than stated.** With the service brake alone the train
+is at most m over a limit, x over it with the emergency brake alone, both as measured, plus what it
+gathers until the brake acts: the curve to a lower limit ends at its place. As EBI is nowhere below
+SBI2, nor that below P, the emergency brake never acts on a train that keeps to P + m.
 
-**A driver who keeps to P is left alone.** Along the curve P falls by less than b per second, so
-one who obeys a P that is t old is less than b t too fast, plus the error of the measured speed:
-no brake is demanded while that is below m. A location that is an intersection of fixes never
-moves f forwards but by the odometer, nor does an authority that never shrinks move E back.
+**A driver who keeps to P is left alone.** If he obeys a P that is t old, t <= t_d, he is at v =
+P(f - vt): D(v + m) + v t_d fitted into the way then, so D(v + m) fits into the way now, and v + m
+<= SBI. Where a location is an intersection of fixes it never moves f forwards but by the odometer,
+nor does an authority that never shrinks move E back.
 
-All this is for authorities that reach at least D_E(v) beyond f when they are taken. One that is
-shorter is obeyed at once with all that the brakes have.
+All this is for authorities that reach at least the way of the brakes beyond f when they are taken.
+One that is shorter is obeyed at once with all that they have. **Limits that come down** over a
+train that is within them, or too near, such as a temporary restriction, are answered by the service
+brake: it must be as slow as that brake makes it, or the emergency brake follows.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf, isfinite
 
 from rail_onboard.braking_curve import GuaranteedBraking
 from rail_onboard.track_code.supervision import STANDSTILL_MPS, SupervisionOutput, Thresholds
 
+from .authority_curves import UNBOUND, AuthorityCurves, CurveSpeeds, CurveTimes, ReceivedAuthority
 from .train_location import Location
 
+__all__ = ["AuthoritySupervision", "CurveTimes", "ReceivedAuthority"]
+
 _SAME_TIME_S = 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class ReceivedAuthority:
-    """A movement authority as its receiver holds it.
-
-    Parameters
-    ----------
-    sealed_s : float
-        When it was sealed, from the time-stamp of its frame.
-    end_m : float
-        Chainage that the front must not pass.
-    limit_mps : float
-        Limit up to the first step.
-    steps : tuple of (float, float)
-        Chainage from which another limit holds, and that limit [m, m/s], in the order of travel.
-    validity_s : float
-        Time from ``sealed_s`` after which it is void.
-    emergency_stop : bool
-        Whether the train must stop at once.
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite, or a limit or the validity negative.
-    """
-
-    sealed_s: float
-    end_m: float
-    limit_mps: float
-    steps: tuple[tuple[float, float], ...] = ()
-    validity_s: float = 3.0
-    emergency_stop: bool = False
-
-    def __post_init__(self) -> None:
-        for name in ("sealed_s", "end_m"):
-            if not isfinite(getattr(self, name)):
-                raise ValueError(f"{name}: {getattr(self, name)} is not finite")
-        for name in ("limit_mps", "validity_s"):
-            if not 0.0 <= getattr(self, name) < inf:
-                raise ValueError(f"{name}: {getattr(self, name)} is negative or not finite")
-        if any(not (isfinite(at_m) and 0.0 <= limit < inf) for at_m, limit in self.steps):
-            raise ValueError(f"steps: {self.steps} are not places and limits")
 
 
 class AuthoritySupervision:
@@ -105,13 +64,16 @@ class AuthoritySupervision:
     timeout_s : float
         Age of an authority at which communication counts as lost, if its validity is not shorter.
     braking : GuaranteedBraking
+        With the gradients along the direction.
     thresholds : Thresholds
+    times : CurveTimes
+    fastest_mps : float
+        Speed that the train never exceeds.
 
     Raises
     ------
     ValueError
-        If a parameter is out of range; of the margin too, if it is less than the stopping distance
-        of a train that is ``service_over_mps`` too fast where it should stand.
+        If a parameter is out of range.
 
     Examples
     --------
@@ -122,7 +84,7 @@ class AuthoritySupervision:
     >>> authority = ReceivedAuthority(sealed_s=0.0, end_m=1500.0, limit_mps=30.0)
     >>> out = supervision.update(0.5, here, 0.0, authority=authority)
     >>> round(out.permitted_mps, 1), out.service_brake
-    (24.3, False)
+    (23.7, False)
     """
 
     def __init__(
@@ -134,20 +96,22 @@ class AuthoritySupervision:
         timeout_s: float = 3.0,
         braking: GuaranteedBraking | None = None,
         thresholds: Thresholds | None = None,
+        times: CurveTimes | None = None,
+        fastest_mps: float = 100.0,
     ) -> None:
-        if not 0.0 < length_m < inf:
-            raise ValueError(f"length_m: {length_m} is not above zero")
-        if direction not in (1, -1):
-            raise ValueError(f"direction: {direction} is neither 1 nor -1")
         if not 0.0 < timeout_s < inf:
             raise ValueError(f"timeout_s: {timeout_s} is not above zero")
-        self._length_m, self._direction, self._timeout_s = length_m, direction, timeout_s
-        self._braking = braking or GuaranteedBraking()
-        self._thresholds = thresholds or Thresholds()
-        self._rolling_m = self._braking.stopping_m(self._thresholds.service_over_mps)
-        if not self._rolling_m <= margin_m < inf:
-            raise ValueError(f"margin_m: {margin_m} is not at least {self._rolling_m:.2f}")
-        self._margin_m = margin_m
+        self.curves = AuthorityCurves(
+            length_m,
+            direction=direction,
+            margin_m=margin_m,
+            braking=braking,
+            thresholds=thresholds,
+            times=times,
+            fastest_mps=fastest_mps,
+        )
+        self._direction, self._timeout_s = direction, timeout_s
+        self._braking, self._thresholds = self.curves.braking, self.curves.thresholds
         self.reset()
 
     def reset(self) -> None:
@@ -155,6 +119,7 @@ class AuthoritySupervision:
         self._time_s = -inf
         self._authority: ReceivedAuthority | None = None
         self._blind: tuple[float, float] | None = None  # time and speed when told to stop
+        self._slowed: tuple[float, float] | None = None  # time and speed when limits came down
         self._service = "no authority"  # why it brakes, empty = it does not
         self._emergency = ""
 
@@ -191,25 +156,28 @@ class AuthoritySupervision:
         """
         if not (isfinite(time_s) and isfinite(speed_mps)):
             self._service = self._emergency = "no odometer"
-            return SupervisionOutput(0.0, True, True, True, "no odometer")
+            return SupervisionOutput(0.0, True, True, True, "no odometer", traction_cut_off=True)
         if time_s < self._time_s:
             self.reset()
         self._time_s = time_s
+        before = self._authority
         if authority is not None:
             self._take(authority)
         speed_mps = abs(speed_mps)
         fastest = speed_mps if fastest_mps is None else fastest_mps
         located = location.valid and isfinite(location.position_m)
         located = located and 0.0 <= location.uncertainty_m < inf
-        permitted_mps, ahead_m = self._permitted(location) if located else (inf, inf)
+        speeds = UNBOUND
+        if located and self._authority is not None:
+            speeds = self.curves.at(self._authority, location)
+            if before is not None and before is not self._authority:
+                self._note_lower_limits(self.curves.at(before, location), speeds, speed_mps)
         stop = self._must_stop(time_s, located)
         if not stop:
             self._blind = None
-        else:
-            if self._blind is None:
-                self._blind = time_s, fastest
-            permitted_mps = min(permitted_mps, self._stopping_mps(time_s))
-        return self._judge(fastest, speed_mps, permitted_mps, ahead_m, stop)
+        elif self._blind is None:
+            self._blind = time_s, fastest
+        return self._judge(fastest, speed_mps, self._in_time(time_s, speeds), stop)
 
     def _take(self, authority: ReceivedAuthority) -> None:
         places_m = [self._direction * at_m for at_m, _ in authority.steps]
@@ -229,86 +197,79 @@ class AuthoritySupervision:
             return "no authority"
         return "" if located else "position unknown"
 
-    def _permitted(self, location: Location) -> tuple[float, float]:
-        """Speed permitted by the authority at a place, and the distance to its end [m]."""
-        if (authority := self._authority) is None:
-            return inf, inf
-        s = self._direction * location.position_m
-        front_m, rear_m = s + location.uncertainty_m, s - location.uncertainty_m - self._length_m
-        over_mps = self._thresholds.service_over_mps
-        steps = [(self._direction * at_m, limit) for at_m, limit in authority.steps]
-        permitted_mps = inf
-        # Each limit holds from its step to the next one: those behind the rear are over.
-        limits = [(-inf, authority.limit_mps), *steps]
-        for (from_m, limit_mps), (to_m, _) in zip(limits, [*steps, (inf, 0.0)], strict=True):
-            if to_m <= rear_m:
-                continue
-            if from_m > front_m:
-                curve_mps = self._braking.speed_mps(from_m - front_m, limit_mps) - over_mps
-                limit_mps = max(limit_mps, curve_mps)
-            permitted_mps = min(permitted_mps, limit_mps)
-        ahead_m = self._direction * authority.end_m - front_m
-        left_m = ahead_m - self._margin_m
-        if left_m <= 0.0:
-            return 0.0, ahead_m
-        curve_mps = self._braking.speed_mps(left_m + self._rolling_m) - over_mps
-        return min(permitted_mps, max(0.0, curve_mps)), ahead_m
+    def _note_lower_limits(self, before: CurveSpeeds, after: CurveSpeeds, speed_mps: float) -> None:
+        """Note when limits came down so that the train is too fast at once."""
+        lower = after.emergency_mps < min(before.emergency_mps, speed_mps)
+        if lower and self._slowed is None and speed_mps <= before.emergency_mps:
+            self._slowed = self._time_s, speed_mps
 
-    def _stopping_mps(self, time_s: float) -> float:
-        """Speed to be expected of a train that brakes since it was told to stop."""
-        assert self._blind is not None
-        since_s, speed_mps = self._blind
-        braked_s = max(0.0, time_s - since_s - self._braking.delay_s)
+    def _in_time(self, time_s: float, speeds: CurveSpeeds) -> CurveSpeeds:
+        """Speeds at which a brake is demanded, of a train that was told to brake."""
+        if self._slowed is not None:
+            braked_mps = self._thresholds.emergency_mps(self._braking_mps(time_s, self._slowed))
+            if braked_mps <= speeds.emergency_mps:
+                self._slowed = None
+            speeds = speeds._replace(emergency_mps=max(speeds.emergency_mps, braked_mps))
+        if self._blind is not None:
+            braked_mps = self._braking_mps(time_s, self._blind)
+            speeds = speeds._replace(
+                permitted_mps=min(speeds.permitted_mps, braked_mps),
+                emergency_mps=min(speeds.emergency_mps, self._thresholds.emergency_mps(braked_mps)),
+            )
+        return speeds
+
+    def _braking_mps(self, time_s: float, since: tuple[float, float]) -> float:
+        """Speed to be expected of a train that brakes since a time, from a speed."""
+        since_s, speed_mps = since
+        braked_s = max(0.0, time_s - since_s - self._braking.full_force_s)
         return max(0.0, speed_mps - self._braking.service_deceleration_mps2 * braked_s)
 
     def _judge(
-        self,
-        speed_mps: float,
-        believed_mps: float,
-        permitted_mps: float,
-        ahead_m: float,
-        stop: str,
+        self, speed_mps: float, believed_mps: float, speeds: CurveSpeeds, stop: str
     ) -> SupervisionOutput:
         """Warn, brake or release.
 
         Where the speed gets doubtful all at once, the service brake answers; the emergency brake
         does where the train is too fast as it is believed, or could not stop before the end.
         """
-        limits = self._thresholds
+        limits, permitted_mps = self._thresholds, speeds.permitted_mps
         standing = believed_mps <= STANDSTILL_MPS
-        ceiling_mps = limits.emergency_mps(permitted_mps)
-        cause = self._emergency_cause(speed_mps, ahead_m, stop)
-        cause = cause or ("too fast" if believed_mps > ceiling_mps else "")
+        cause = self._emergency_cause(speed_mps, speeds, stop)
+        cause = cause or ("too fast" if believed_mps > speeds.emergency_mps else "")
         self._emergency = self._emergency or cause
         # A train that is held starts again for a speed that is worth it only.
         start_mps = max(limits.release_under_mps if self._service else 0.0, STANDSTILL_MPS)
+        if speeds.release_mps > 0.0:
+            start_mps = min(start_mps, 0.5 * speeds.release_mps)
         below_mps = max(permitted_mps - limits.release_under_mps, 0.5 * permitted_mps)
         if stop:
             self._service = stop
         elif permitted_mps <= 0.0 or (standing and permitted_mps <= start_mps):
             self._service = "end of authority"
-        elif speed_mps > permitted_mps + limits.service_over_mps:
+        elif speed_mps > speeds.service_mps:
             self._service = "too fast"
         elif speed_mps <= below_mps:
             if standing and not cause:
                 self._emergency = ""
             self._service = self._emergency
         self._service = self._service or self._emergency
+        warning = bool(self._service) or speed_mps > speeds.warning_mps
         return SupervisionOutput(
             permitted_mps,
-            bool(self._service) or speed_mps > permitted_mps + limits.warn_over_mps,
+            warning,
             bool(self._service),
             bool(self._emergency),
             self._emergency or self._service,
+            traction_cut_off=warning,
         )
 
-    def _emergency_cause(self, speed_mps: float, ahead_m: float, stop: str) -> str:
+    def _emergency_cause(self, speed_mps: float, speeds: CurveSpeeds, stop: str) -> str:
         """Why the emergency brake is to act at this place; empty if there is no cause."""
         if stop == "emergency stop":
             return stop
         if speed_mps > STANDSTILL_MPS:
-            if ahead_m < 0.0:
+            if speeds.passed:
                 return "end passed"
-            if self._braking.stopping_m(speed_mps, emergency=True) > ahead_m:
+            if speed_mps > speeds.end_mps:
                 return "end too near"
         return ""

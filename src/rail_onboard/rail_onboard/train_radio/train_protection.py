@@ -162,6 +162,8 @@ class TrainProtection:
             tuple((step.from_m, step.limit_mps) for step in telegram.steps),
             telegram.validity_s,
             telegram.emergency_stop,
+            telegram.overlap_m,
+            telegram.release,
         )
 
     def frame(self, time_ns: int) -> bytes:

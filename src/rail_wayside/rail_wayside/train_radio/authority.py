@@ -12,7 +12,8 @@ class IssuedAuthority(NamedTuple):
 
     Chainage ``end_m`` [m] is not to be passed by the front; ``limit_mps`` holds up to the first
     step; ``cause`` names what is ahead; ``shortened`` says that the one before reached further.
-    A step up already lies where the rear has left the lower limit.
+    A step up already lies where the rear has left the lower limit. The danger point is
+    ``overlap_m`` beyond the end; ``release`` lets the train come to the end at a release speed.
     """
 
     train: int
@@ -25,6 +26,8 @@ class IssuedAuthority(NamedTuple):
     emergency_stop: bool
     shortened: bool
     cause: str
+    overlap_m: float = 0.0
+    release: bool = False
 
 
 def to_telegram(
@@ -45,4 +48,6 @@ def to_telegram(
         authority.steps,
         authority.emergency_stop,
         located,
+        authority.overlap_m,
+        authority.release,
     )

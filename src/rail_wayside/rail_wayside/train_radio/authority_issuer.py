@@ -21,6 +21,7 @@ from math import inf, isfinite, nan, sqrt
 from typing import NamedTuple
 
 from rail_msgs_py.stamps import NANOSECONDS
+from rail_msgs_py.train_radio.cycle import Cycle
 from rail_msgs_py.train_radio.safe_frame import FrameKind
 from rail_msgs_py.train_radio.train_channel import CountedChannel, FrameEnd
 from rail_msgs_py.train_radio.train_report import FURTHEST_M, WIDEST_M, LocationReport
@@ -94,6 +95,8 @@ class AuthorityIssuer:
         Half-width of the interval told to a train, in standard deviations of its range.
     releases : iterable of Release
         Of trains to run on sight; one before the controller is on goes unheard.
+    tick_s, period_s : float
+        Time of a tick, and from authority to authority of a train: at least a tick.
     """
 
     def __init__(
@@ -105,9 +108,12 @@ class AuthorityIssuer:
         leaves_at_m: Mapping[int, float] | None = None,
         fix_sigmas: float = 4.0,
         releases: Iterable[Release] = (),
+        tick_s: float = 1.0,
+        period_s: float = 0.0,
     ) -> None:
         leaves = leaves_at_m or {}
         self._block, self._bases, self._sigmas = block, tuple(bases), fix_sigmas
+        self._cycle = Cycle(period_s, tick_s)
         self._callers = {
             number: _ConnectedTrain(CountedChannel(channel), leaves.get(number, inf))
             for number, channel in channels.items()
@@ -201,13 +207,15 @@ class AuthorityIssuer:
             caller.place = time_s, position_m, self._sigmas * sigma_m
 
     def telegrams(self, time_ns: int) -> dict[str, list[tuple[int, bytes]]]:
-        """Frames for every train, by base station, each with its slot."""
+        """Frames for every train, by base station, each with its slot; none between cycles."""
         time_s = time_ns / NANOSECONDS
         self._begin(time_s)
         while self._releases and self._releases[0].at_s <= time_s + 1e-9:
             due = self._releases.pop(0)
             self._block.release(due.number, due.at_s, due.speed_mps + _OVER_ON_SIGHT_MPS)
         out: dict[str, list[tuple[int, bytes]]] = {base: [] for base in self._bases}
+        if not self._cycle.begins(time_ns):
+            return out
         for number, caller in self._callers.items():
             if caller.leaving and caller.channel.channel.silence_s(time_ns) > _LEFT_S:
                 self._block.remove(number)

@@ -5,10 +5,11 @@ is set by its neighbour ahead alone, by the end of the track, and by what is whe
 should be:
 
 ======================== ====================================================================
-neighbour, same way      its worst rear, less the margin
+neighbour, same way      its worst rear, less the margin, which is the overlap
 neighbour, oncoming      the furthest it was ever let or may be, less the margin: who was
                          given a stretch first keeps it, and neither is let into the other's
-end of the track         less the end margin
+end of the track         less the end margin; the overlap reaches to the buffer, and the train may
+                         come to the end at a release speed
 stray position           where a train reports, or is ranged, off its own track
 ======================== ====================================================================
 
@@ -36,7 +37,7 @@ from rail_msgs_py.train_radio.train_report import LocationReport
 
 from .authority import IssuedAuthority, to_telegram
 from .opening import Opening
-from .speed_profile import Segment
+from .speed_profile import Segment, SpeedRestriction
 from .train_bounds import TrainBounds, TrainStart, Trouble
 from .train_order import TrainOrder, inverted
 
@@ -58,6 +59,8 @@ class MovingBlock:
         Kept behind a train and between oncoming ones; no train rolls back further.
     end_margin_m : float
         Kept before the end of a track.
+    buffer_m : float
+        From the end of a track to what must not be touched there.
     overspeed_mps : float
         By how much a train may exceed the highest limit of its track at most.
     sigmas : float
@@ -68,6 +71,8 @@ class MovingBlock:
         A train that reports no more than that stands; what it still rolls, the margin covers.
     leaving : collection of int
         Numbers of the trains that go on to the next control area: for them the track does not end.
+    restrictions : iterable of SpeedRestriction
+        Temporary ones; each is told while it holds.
 
     Raises
     ------
@@ -93,15 +98,18 @@ class MovingBlock:
         *,
         margin_m: float = 10.0,
         end_margin_m: float = 20.0,
+        buffer_m: float = 0.0,
         overspeed_mps: float = 3.0,
         sigmas: float = 6.0,
         validity_s: float = 4.0,
         standing_mps: float = 0.1,
         leaving: Collection[int] = (),
+        restrictions: Iterable[SpeedRestriction] = (),
     ) -> None:
         for name, value, most in (
             ("margin_m", margin_m, FURTHEST_M),
             ("end_margin_m", end_margin_m, FURTHEST_M),
+            ("buffer_m", buffer_m, FURTHEST_M),
             ("overspeed_mps", overspeed_mps, FASTEST_MPS),
             ("sigmas", sigmas, 100.0),
             ("validity_s", validity_s, LONGEST_S),
@@ -109,15 +117,17 @@ class MovingBlock:
         ):
             if not 0.0 <= value <= most:
                 raise ValueError(f"{name}: {value} is not from 0 to {most:g}")
-        self._margin_m, self._end_margin_m = margin_m, end_margin_m
+        self._margin_m, self._end_margin_m, self._buffer_m = margin_m, end_margin_m, buffer_m
         self._overspeed_mps, self._sigmas = overspeed_mps, sigmas
         self._validity_s, self._standing_mps = validity_s, standing_mps
         self._leaving = frozenset(leaving)
+        temporary = list(restrictions)
         self._train_orders: dict[int, TrainOrder] = {}
         for segment in segments:
             if segment.number in self._train_orders:
                 raise ValueError(f"segments: number {segment.number} is given twice")
-            self._train_orders[segment.number] = TrainOrder(segment)
+            mine = [each for each in temporary if each.segment == segment.number]
+            self._train_orders[segment.number] = TrainOrder(segment, mine)
         self._trains: dict[int, TrainBounds] = {}
         self._rank = 0
         self._opening: Opening | None = None
@@ -307,7 +317,7 @@ class MovingBlock:
         end_m = line.end_m(direction) - self._end_margin_m
         if train in self._leaving:
             end_m += BEYOND_M
-        cause = "end of the track"
+        cause, overlap_m, release = "end of the track", self._end_margin_m + self._buffer_m, True
         ahead = bounds.above if direction > 0 else bounds.below
         if ahead is not None:
             before_m = ahead.rear_m
@@ -315,19 +325,27 @@ class MovingBlock:
                 before_m = -ahead.reserve_at_m(time_s)
             if before_m - self._margin_m < end_m:
                 end_m = before_m - self._margin_m
+                # Two that come towards each other share the margin.
+                overlap_m, release = (0.5 if oncoming else 1.0) * self._margin_m, False
                 cause = ahead.as_oncoming if oncoming else ahead.as_leader
         if line.strays:
             before = line.before_strays(bounds, self._margin_m)
             if before is not None and before[0] < end_m:
-                end_m, cause = before
+                (end_m, cause), overlap_m, release = before, self._margin_m, False
         stop = inverted(bounds)
         end_m -= bounds.lead_m
         if stop:
             end_m, cause = min(end_m, bounds.rear_m), Trouble.ORDER.value
-        if (same := bounds.reissue(time_s, end_m, stop, cause)) is not None:
+            overlap_m, release = 0.0, False
+        # What is told of limits changes with the restrictions in force.
+        limits_changed = line.limits_at(time_s) is not bounds.limits
+        bounds.limits = line.limits_at(time_s)
+        if not limits_changed and (
+            (same := bounds.reissue(time_s, end_m, stop, cause)) is not None
+        ):
             return same
         shortened = bounds.issue(time_s, end_m, self._validity_s)
-        limit_mps, steps = line.limits.ahead(direction, bounds.rear_m, bounds.front_m, end_m)
+        limit_mps, steps = bounds.limits.ahead(direction, bounds.rear_m, bounds.front_m, end_m)
         authority = IssuedAuthority(
             train,
             number,
@@ -339,6 +357,8 @@ class MovingBlock:
             stop,
             shortened,
             cause,
+            overlap_m,
+            release,
         )
         bounds.granted = bounds.rear_m, bounds.front_m, authority
         return authority

@@ -12,7 +12,7 @@ from rail_msgs_py.train_radio.unit_clock import ClockParameters, unit_clock_of
 
 from .authority_issuer import AuthorityIssuer, Release
 from .moving_block import MovingBlock
-from .speed_profile import Segment
+from .speed_profile import Segment, SpeedRestriction
 from .train_bounds import TrainStart
 
 
@@ -51,8 +51,18 @@ class AuthorityParameters(ClockParameters):
     placed_m: float = PLACED.parameter()
     margin_m: float = quantities.MARGIN.parameter()
     end_margin_m: float = parameter(
-        5.0, "kept before the end of a track", unit="m", low=0.0, high=1e4
+        0.0, "kept before the end of a track", unit="m", low=0.0, high=1e4
     )
+    buffer_m: float = quantities.BUFFER.parameter()
+    authority_period_s: float = quantities.AUTHORITY_PERIOD.parameter()
+    restricted_segments: tuple[int, ...] = parameter(
+        (), "track of each temporary speed restriction", low=0
+    )
+    restricted_from_m: tuple[float, ...] = parameter((), "where each begins", unit="m")
+    restricted_to_m: tuple[float, ...] = parameter((), "where each ends", unit="m")
+    restricted_mps: tuple[float, ...] = parameter((), "limit of each", unit="m/s", low=0.0)
+    restricted_from_s: tuple[float, ...] = parameter((), "since when each holds", unit="s")
+    restricted_to_s: tuple[float, ...] = parameter((), "until when each holds", unit="s")
     validity_s: float = quantities.AUTHORITY_TIMEOUT.parameter()
     fix_sigmas: float = CLAIM_SIGMAS.parameter()
     secrets: tuple[str, ...] = parameter((), "key with each train, in hexadecimal digits")
@@ -91,6 +101,13 @@ def authority_issuer_of(p: AuthorityParameters) -> AuthorityIssuer | None:
             f"zone_controller: released_at_s: {p.released_at_s}: one, and a speed, for each of"
             f" {len(p.released_trains)} releases"
         )
+    per_restriction = ("from_m", "to_m", "mps", "from_s", "to_s")
+    for name in (f"restricted_{each}" for each in per_restriction):
+        if len(getattr(p, name)) != len(p.restricted_segments):
+            raise ParameterError(
+                f"zone_controller: {name}: {len(getattr(p, name))} entries for"
+                f" {len(p.restricted_segments)} restrictions"
+            )
     try:
         return _authority_issuer(p)
     except ValueError as error:
@@ -119,7 +136,9 @@ def _authority_issuer(p: AuthorityParameters) -> AuthorityIssuer:
         starts,
         margin_m=p.margin_m,
         end_margin_m=p.end_margin_m,
+        buffer_m=p.buffer_m,
         validity_s=p.validity_s,
+        restrictions=_restrictions(p),
         leaving=leaves,
     )
     clock = unit_clock_of(p)
@@ -135,4 +154,15 @@ def _authority_issuer(p: AuthorityParameters) -> AuthorityIssuer:
         leaves_at_m=leaves,
         fix_sigmas=p.fix_sigmas,
         releases=releases,
+        tick_s=p.tick_s,
+        period_s=p.authority_period_s,
     )
+
+
+def _restrictions(p: AuthorityParameters) -> list[SpeedRestriction]:
+    rows = zip(
+        *(p.restricted_segments, p.restricted_from_m, p.restricted_to_m, p.restricted_mps),
+        *(p.restricted_from_s, p.restricted_to_s),
+        strict=True,
+    )
+    return [SpeedRestriction(*row) for row in rows]

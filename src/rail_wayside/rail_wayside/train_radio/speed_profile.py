@@ -12,7 +12,8 @@ so a step down stays where it is and a step up comes W later.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from math import ceil, inf
 
 from rail_msgs_py.train_radio.fixed_point import check_identity, check_number
@@ -74,6 +75,64 @@ class Segment:
     def fastest_mps(self) -> float:
         """Highest limit."""
         return max(limit_mps for _, limit_mps in self.limits)
+
+
+@dataclass(frozen=True)
+class SpeedRestriction:
+    """A lower limit on a stretch of a segment for some time.
+
+    Parameters
+    ----------
+    segment : int
+    from_m, to_m : float
+        Chainages, rising.
+    limit_mps : float
+    from_s, to_s : float
+        Times, rising; it holds from the first up to the second.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    segment: int
+    from_m: float
+    to_m: float
+    limit_mps: float
+    from_s: float
+    to_s: float
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_identity("segment", self.segment)
+        check_number("limit_mps", self.limit_mps, 0.0, FASTEST_MPS)
+        for low, high in (("from_m", "to_m"), ("from_s", "to_s")):
+            if not getattr(self, low) < getattr(self, high):
+                raise ValueError(f"{high}: {getattr(self, high)} is not after {low}")
+
+
+def restricted(segment: Segment, restrictions: Iterable[SpeedRestriction]) -> Segment:
+    """Segment with the limits that restrictions leave of its own.
+
+    >>> line = Segment(1, "up", 5000.0, ((0.0, 20.0),))
+    >>> restricted(line, [SpeedRestriction(1, 1000.0, 1500.0, 10.0, 0.0, 60.0)]).limits
+    ((0.0, 20.0), (1000.0, 10.0), (1500.0, 20.0))
+    """
+    held = list(restrictions)
+    starts = [from_m for from_m, _ in segment.limits]
+    own = [limit_mps for _, limit_mps in segment.limits]
+    inner = {place for each in held for place in (each.from_m, each.to_m) if place > starts[0]}
+    limits: list[tuple[float, float]] = []
+    for place in sorted({*starts, *inner}):
+        limit_mps = min(
+            own[bisect_right(starts, place) - 1],
+            *(each.limit_mps for each in held if each.from_m <= place < each.to_m),
+            inf,
+        )
+        if not limits or limit_mps != limits[-1][1]:
+            limits.append((place, limit_mps))
+    return replace(segment, limits=tuple(limits))
 
 
 class _Profile:

@@ -33,6 +33,7 @@ from rail_msgs_py.train_radio.train_report import (
 )
 
 from .authority import IssuedAuthority
+from .speed_profile import AuthorityLimits
 
 #: A range confirms a report that is at most this much older or younger.
 CONFIRM_S = 2.0
@@ -165,6 +166,8 @@ class TrainBounds:
         #: End of the authority in force, and of a longer one that it may not have superseded.
         self.end_m = self.held_m = -inf
         self._issued_s = self._held_until_s = -inf
+        #: Limits of the newest authority.
+        self.limits: AuthorityLimits | None = None
         #: The newest authority, and the rear and front it was made for.
         self.granted: tuple[float, float, IssuedAuthority] | None = None
         if start.front_m is not None:

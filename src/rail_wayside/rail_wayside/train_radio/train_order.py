@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
 from itertools import pairwise
 
-from .speed_profile import AuthorityLimits, Segment
+from .speed_profile import AuthorityLimits, Segment, SpeedRestriction, restricted
 from .train_bounds import TrainBounds
 
 
@@ -18,11 +19,14 @@ class TrainOrder:
     Parameters
     ----------
     segment : Segment
+    restrictions : iterable of SpeedRestriction
+        Those on this segment.
     """
 
-    def __init__(self, segment: Segment) -> None:
+    def __init__(self, segment: Segment, restrictions: Iterable[SpeedRestriction] = ()) -> None:
         self.segment = segment
-        self.limits = AuthorityLimits(segment)
+        self._restrictions = tuple(restrictions)
+        self._limits: dict[tuple[SpeedRestriction, ...], AuthorityLimits] = {}
         #: Places (chainages) of trains that should not be here: name, from, to; by (train, ranged).
         self.strays: dict[tuple[int, bool], tuple[str, float, float]] = {}
         self._order: list[TrainBounds] = []
@@ -30,6 +34,15 @@ class TrainOrder:
     def end_m(self, direction: int) -> float:
         """End of the track along a direction (direction times chainage)."""
         return self.segment.length_m if direction > 0 else 0.0
+
+    def limits_at(self, time_s: float) -> AuthorityLimits:
+        """Limits with the restrictions that hold at a time."""
+        held = tuple(each for each in self._restrictions if each.from_s <= time_s < each.to_s)
+        limits = self._limits.get(held)
+        if limits is None:
+            limits = AuthorityLimits(restricted(self.segment, held))
+            self._limits[held] = limits
+        return limits
 
     def insert(self, bounds: TrainBounds) -> None:
         """Give a train its place in the order; among equals the one that entered first is ahead."""

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
+from typing import Final
 
 from rail_corridor.errors import InputError, did_you_mean
 from rail_corridor.scenario.model import Scenario
-from rail_signals.track_code.scales import LEAST_BRAKING_MPS2, deceleration_mps2
+from rail_msgs_py.train_radio.movement_authority import FASTEST_MPS
+from rail_onboard.braking_curve import corrected
+from rail_onboard.train_radio.authority_curves import ReceivedAuthority
+from rail_onboard.train_radio.train_location import Location
 from rail_signals.train_radio.slots import RadioSlots
+from rail_world.trains.description import VehicleDescription
 
 from .keys import pair_keys
-from .nodes import CONTROLLER, burst_format, steepest_fall_permil
+from .nodes import CONTROLLER, burst_format, curves_of
 from .placement import bases_of
 from .section import CBTC, CbtcPlan, ClockError, DeadBaseStation, NetworkThreats
+
+#: Half-width of the interval of a front as ranges leave it [m].
+_FIX_HALF_M: Final = 2.5
 
 
 def _check_clocks(scenario: Scenario) -> None:
@@ -44,23 +53,22 @@ def check_cbtc(scenario: Scenario, train_fields: Sequence[str]) -> None:
             field="junctions.0.branch",
             value=scenario.junctions[0].branch,
         )
-    for train, field in zip(scenario.trains, train_fields, strict=True):
+    period_s = max(plan.authority_period_s, scenario.tick_s)
+    if plan.timeout_s < period_s + 2.0 * scenario.tick_s:
+        raise InputError(
+            f"is less than the period of authorities, {period_s:g} s, and two"
+            f" ticks of {scenario.tick_s:g} s: trains would brake between two",
+            field="cbtc.timeout_s",
+            value=plan.timeout_s,
+        )
+    for index, (train, field) in enumerate(zip(scenario.trains, train_fields, strict=True)):
         reason = "trains with authorities by radio run towards increasing chainage only"
         if train.direction < 0:
             raise InputError(reason, field=f"{field}.direction", value=train.direction)
         if train.reverse_at:
             raise InputError(reason, field=f"{field}.reverse_at", value=len(train.reverse_at))
-        for name, counted in (
-            ("max_service_brake_mps2", plan.braking_mps2),
-            ("emergency_brake_mps2", plan.emergency_mps2),
-        ):
-            if getattr(train.vehicle, name) < counted:
-                raise InputError(
-                    f"is weaker than the {counted:g} m/s^2 that cbtc counts on",
-                    field=f"{field}.vehicle.{name}",
-                    value=getattr(train.vehicle, name),
-                )
-    _check_braking(scenario, plan)
+        _check_brakes(plan, train.vehicle, f"{field}.vehicle")
+        _check_protection(scenario, plan, index + 1, field)
     _check_signal(scenario, plan)
     _check_clocks(scenario)
     pair_keys(scenario)
@@ -78,17 +86,47 @@ def check_cbtc(scenario: Scenario, train_fields: Sequence[str]) -> None:
             )
 
 
-def _check_braking(scenario: Scenario, plan: CbtcPlan) -> None:
-    """See that what is left of the guaranteed brake stops a train on the steepest fall."""
-    for name, track in scenario.network.tracks.items():
-        fall_permil = steepest_fall_permil(track)
-        left_mps2 = deceleration_mps2(plan.braking_mps2, -fall_permil)
-        if left_mps2 < LEAST_BRAKING_MPS2:
+def _check_brakes(plan: CbtcPlan, vehicle: VehicleDescription, field: str) -> None:
+    """Refuse guaranteed rates above what the vehicle has with the factors."""
+    service = [plan.braking_mps2, *(band.braking_mps2 for band in plan.brake_bands)]
+    emergency = [plan.emergency_mps2, *(band.emergency_mps2 for band in plan.brake_bands)]
+    factors = plan.brake_confidence, plan.brake_adhesion
+    for name, counted in (
+        ("max_service_brake_mps2", max(service)),
+        ("emergency_brake_mps2", max(emergency)),
+    ):
+        rate = getattr(vehicle, name)
+        ((_, least),) = corrected(((inf, rate),), *factors)
+        if least < counted - 1e-9:
             raise InputError(
-                f"does not stop a train on the fall of {fall_permil:g} per mille of {name}",
-                field="cbtc.braking_mps2",
-                value=plan.braking_mps2,
+                f"is, times the factors {factors[0]:g} and {factors[1]:g}, weaker than the"
+                f" {counted:g} m/s^2 that cbtc counts on",
+                field=f"{field}.{name}",
+                value=rate,
             )
+
+
+def _check_protection(scenario: Scenario, plan: CbtcPlan, number: int, field: str) -> None:
+    """Refuse a gradient that leaves too little of a brake, and a buffer too near to stop at."""
+    try:
+        curves = curves_of(scenario, plan, number)
+    except ValueError as error:
+        raise InputError(
+            f"does not go with its track: {error}", field=field, value=number
+        ) from None
+    train = scenario.trains[number - 1]
+    track = scenario.network.tracks[train.route[0]]
+    if train.leaves_on_arrival:
+        return
+    end = ReceivedAuthority(0.0, track.length_m, FASTEST_MPS, overlap_m=plan.buffer_m, release=True)
+    near = Location(track.length_m - _FIX_HALF_M, _FIX_HALF_M, True)
+    if curves.at(end, near).release_mps <= 0.0:
+        raise InputError(
+            f"leaves no release speed to {train.name} at the end of {train.route[0]}: with its"
+            f" brakes, on that gradient, the buffer is too near",
+            field="cbtc.buffer_m",
+            value=plan.buffer_m,
+        )
 
 
 def _check_signal(scenario: Scenario, plan: CbtcPlan) -> None:

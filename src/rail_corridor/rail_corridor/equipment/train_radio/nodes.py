@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
-from math import inf
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from rail_corridor.equipment.node_spec import NodeSpec
 from rail_corridor.equipment.subsystem import PlanContext
 from rail_corridor.scenario.actions import ReleaseOnSight
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.quantities import CLAIM_SIGMAS
+from rail_msgs_py.train_radio.movement_authority import FASTEST_MPS
 from rail_msgs_py.train_radio.quantities import ON_SIGHT
 from rail_msgs_py.train_radio.safe_frame import FRAME_BYTES
+from rail_onboard.train_radio.authority_curves import AuthorityCurves
 from rail_signals.constants import SPEED_OF_LIGHT_M_PER_S
 from rail_signals.train_radio.burst import RadioBurstFormat
 from rail_signals.train_radio.space_time_block import scheme
@@ -28,10 +29,10 @@ from .world import threats_of
 
 CBTC_MEDIUM: Final = "/world/cbtc_medium"
 CONTROLLER: Final = "/wayside/zone_controller"
-#: No vehicle exceeds its highest speed by more.
-_OVERSPEED_MPS: Final = 3.0
 #: Resistance of the sharpest curve of the line model, force over weight.
 _STEEPEST_CURVE: Final = 0.008
+#: No train is faster than its design speed by more than this.
+FASTER: Final = 1.2
 
 
 def cbtc_nodes(scenario: Scenario, context: PlanContext) -> list[NodeSpec]:
@@ -130,12 +131,19 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
         "segment": list(scenario.network.tracks).index(train.route[0]),
         "start_m": train.start_m,
         "length_m": train.vehicle.length_m,
-        "steepest_fall_permil": steepest_fall_permil(track),
+        "gradient_from_m": tuple(at_m for at_m, _ in gradient_steps(track)),
+        "gradient_permil": tuple(permil for _, permil in gradient_steps(track)),
         "braking_mps2": plan.braking_mps2,
         "emergency_mps2": plan.emergency_mps2,
+        "band_up_to_mps": tuple(band.up_to_kmh / 3.6 for band in plan.brake_bands),
+        "band_braking_mps2": tuple(band.braking_mps2 for band in plan.brake_bands),
+        "band_emergency_mps2": tuple(band.emergency_mps2 for band in plan.brake_bands),
+        "brake_build_up_s": train.vehicle.brake_build_up_s,
+        "fastest_mps": FASTER * train.vehicle.max_speed_kmh / 3.6,
+        "cycle_s": plan.cycle_s,
+        "report_period_s": plan.report_period_s,
         "traction_mps2": vehicle.traction_mps2(0.0),
         "most_braking_mps2": most_braking_mps2(vehicle, track),
-        "fastest_mps": vehicle.max_speed_mps + _OVERSPEED_MPS,
         "releases_s": tuple(each.at_s for each in releases),
         "on_sight_mps": on_sight_mps(releases),
         "odometer_error": CLAIM_SIGMAS.default * plan.odometer_error,
@@ -146,6 +154,24 @@ def _atp(scenario: Scenario, plan: CbtcPlan, number: int, timeout_s: float) -> d
         "tick_s": scenario.tick_s,
         "timeout_s": 3 * timeout_s / 5,
     }
+
+
+def curves_of(scenario: Scenario, plan: CbtcPlan, number: int) -> AuthorityCurves:
+    """Curves of a train, as its protection makes them.
+
+    Raises
+    ------
+    ValueError
+        If its brakes do not go with its track.
+    """
+    from rail_onboard.train_radio.atp_node import AtpParameters, supervision_of
+
+    return supervision_of(AtpParameters(**_atp(scenario, plan, number, 1.0))).curves
+
+
+def gradient_steps(track: Track) -> list[tuple[float, float]]:
+    """Gradients of a track [m, permil], from 0 on."""
+    return _changes(track.gradients_permil.part(0.0, track.length_m))
 
 
 def steepest_fall_permil(track: Track) -> float:
@@ -206,6 +232,9 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
             on_sight_mps(releases_of(scenario, each.train)) for each in scenario.actions
         ),
         "margin_m": plan.margin_m,
+        "buffer_m": plan.buffer_m,
+        "authority_period_s": plan.authority_period_s,
+        **_restrictions(scenario),
         "validity_s": plan.timeout_s,
         **clock_parameters(scenario, CONTROLLER),
         "secrets": tuple(pair_keys(scenario)[train.name] for train in by_departure),
@@ -214,10 +243,31 @@ def controller_parameters(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def limit_steps(track: Track, fastest_mps: float) -> list[tuple[float, float]]:
-    """Speed limits of a track [m, m/s], from 0 on; where there is none, the fastest train's."""
-    steps = [
-        (at_m, fastest_mps if limit_mps == inf else limit_mps)
-        for at_m, limit_mps in track.limits_mps.part(0.0, track.length_m)
-    ]
+def limit_steps(track: Track, fastest_mps: float = FASTEST_MPS) -> list[tuple[float, float]]:
+    """Speed limits of a track [m, m/s], from 0 on; none is above what its trains can run."""
+    steps = track.limits_mps.part(0.0, track.length_m)
+    return _changes([(at_m, min(limit_mps, fastest_mps)) for at_m, limit_mps in steps])
+
+
+def _changes(steps: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return [steps[0], *(after for before, after in pairwise(steps) if after[1] != before[1])]
+
+
+def _restrictions(scenario: Scenario) -> dict[str, tuple[Any, ...]]:
+    """Temporary speed restrictions as the zone controller is told of them."""
+    tracks = list(scenario.network.tracks)
+    faults = [each for each in scenario.faults if each.kind == "speed_restriction"]
+    rows = [
+        (
+            tracks.index(fault.track),
+            fault.from_m,
+            fault.to_m,
+            fault.speed_kmh / 3.6,
+            fault.from_s,
+            fault.to_s,
+        )
+        for fault in cast("list[Any]", faults)
+    ]
+    names = ("segments", "from_m", "to_m", "mps", "from_s", "to_s")
+    columns = zip(*rows, strict=True) if rows else ((),) * len(names)
+    return {f"restricted_{name}": tuple(each) for name, each in zip(names, columns, strict=True)}

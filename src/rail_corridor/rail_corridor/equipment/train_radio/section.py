@@ -37,6 +37,20 @@ class LossPlan(Description):
         return self
 
 
+class BrakeBand(Description):
+    """Guaranteed brake rates up to a speed, from the one of the band before."""
+
+    up_to_kmh: StrictFloat = Field(gt=0.0, le=600.0, description="up to this speed [km/h]")
+    braking_mps2: StrictFloat = field_of(quantities.BRAKING)
+    emergency_mps2: StrictFloat = field_of(quantities.EMERGENCY_BRAKING)
+
+    @model_validator(mode="after")
+    def _brakes_agree(self) -> BrakeBand:
+        if self.emergency_mps2 < self.braking_mps2:
+            raise ValueError(f"emergency_mps2: is weaker than braking_mps2, {self.braking_mps2:g}")
+        return self
+
+
 class CbtcPlan(Description):
     """Train control by radio: base stations, link and margins.
 
@@ -72,6 +86,15 @@ class CbtcPlan(Description):
     )
     braking_mps2: StrictFloat = field_of(quantities.BRAKING)
     emergency_mps2: StrictFloat = field_of(quantities.EMERGENCY_BRAKING)
+    brake_bands: tuple[BrakeBand, ...] = Field(
+        default=(), max_length=20, description="guaranteed rates that hold up to other speeds"
+    )
+    brake_confidence: StrictFloat = field_of(quantities.BRAKE_CONFIDENCE)
+    brake_adhesion: StrictFloat = field_of(quantities.BRAKE_ADHESION)
+    buffer_m: StrictFloat = field_of(quantities.BUFFER)
+    cycle_s: StrictFloat = field_of(quantities.ATP_CYCLE)
+    report_period_s: StrictFloat = field_of(quantities.REPORT_PERIOD)
+    authority_period_s: StrictFloat = field_of(quantities.AUTHORITY_PERIOD)
     margin_m: StrictFloat = field_of(quantities.MARGIN)
     timeout_s: StrictFloat = field_of(quantities.AUTHORITY_TIMEOUT)
     keys: str | None = Field(
@@ -90,6 +113,9 @@ class CbtcPlan(Description):
     def _brakes_agree(self) -> CbtcPlan:
         if self.emergency_mps2 < self.braking_mps2:
             raise ValueError(f"emergency_mps2: is weaker than braking_mps2, {self.braking_mps2:g}")
+        speeds = [band.up_to_kmh for band in self.brake_bands]
+        if speeds != sorted(set(speeds)):
+            raise ValueError(f"brake_bands: {speeds} km/h do not rise")
         return self
 
     def located(self, directory: Path) -> CbtcPlan:

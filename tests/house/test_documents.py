@@ -137,3 +137,24 @@ def test_a_stale_part_is_noticed_and_refreshed(
     assert page.read_text() == (
         f"# Page\n<!-- generated: os:getcwd -->\n{tmp_path}\n<!-- end of generated -->\ntail\n"
     )
+
+
+def test_tables_of_a_study_come_from_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refresh = load_refresh()
+    monkeypatch.setattr(refresh, "ROOT", tmp_path)
+    page, results = tmp_path / "PAGE.md", tmp_path / "kills.study"
+    results.mkdir()
+    other = "<!-- study: rail study threats; tables: 1 -->\n<!-- end of study -->\n"
+    page.write_text(
+        "a\n<!-- study: rail study kills --runs 3; tables: 2 -->\nold\n<!-- end of study -->\n"
+        + other
+    )
+    (results / "journal.jsonl").write_text('{"name": "kills"}\n{"cell": 0}\n')
+    tables = ("kills", " one  ", "kills, continued", " two", "", "kills, continued", " three")
+    (results / "summary.txt").write_text("\n".join(tables))
+    assert refresh.main(["--study", str(results)]) == 0
+    text = page.read_text()
+    assert "-->\n```\n one\n\n two\n```\n<!-- end" in text and text.endswith(other)
+    assert refresh.main(["--check"]) == 0

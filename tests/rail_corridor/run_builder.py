@@ -26,7 +26,7 @@ from rail_corridor.equipment.train_bus.world import bus_trains
 from rail_corridor.loading.loader import load_scenario
 from rail_corridor.plan.plan import Plan, make_plan, run_data_of
 from rail_corridor.report.report import make_report
-from rail_corridor.run_data import Record
+from rail_corridor.run_data import Record, RunData
 from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.topics.doppler import DOPPLER_FIX
 from rail_msgs_py.topics.localizer import LOCALIZER_STATE
@@ -258,6 +258,15 @@ class RunBuilder:
         )
         return self
 
+    def rear_taken(self, train: str, rear_m: ArrayLike) -> RunBuilder:
+        """Where the zone controller takes the rear of a train to be at the worst."""
+        columns = dict.fromkeys(AUTHORITY.columns, 0.0)
+        columns |= {"end_of_authority_m": FAR_M, "worst_rear_m": rear_m}
+        self._put(
+            self._recording[AUTHORITY], self.trains.index(train), AUTHORITY.columns, **columns
+        )
+        return self
+
     def reported(self, train: str, tick: int, **rows: float) -> RunBuilder:
         """A location report that the zone controller took: genuine but for the figures given."""
         index = self.trains.index(train)
@@ -332,6 +341,11 @@ class RunBuilder:
         return self
 
     # What the project makes of it --------------------------------------------------------
+
+    @property
+    def data(self) -> RunData:
+        """Truth and claims of the run, for those who judge it."""
+        return self._recording
 
     def report(self) -> dict[str, Any]:
         """The report of the run, as `rail run` makes it."""

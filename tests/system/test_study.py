@@ -16,7 +16,7 @@ import yaml
 
 from rail_corridor.loading.loader import builtin_scenarios, load_scenario
 from rail_corridor.loading.overrides import Overrides
-from rail_corridor.study.corridor_run import report_of_run
+from rail_corridor.study.corridor_run import run_corridor
 from rail_corridor.yaml_file import load_yaml
 from rail_msgs_py.node import CorridorMixin
 
@@ -158,5 +158,5 @@ def test_nothing_of_a_run_stays_in_its_process() -> None:
 
     before = len(alive())
     for _ in range(2):
-        report_of_run(scenario)
+        run_corridor(scenario)
     assert len(alive()) == before

@@ -22,6 +22,7 @@ from rail_corridor.studies.kills import (
 )
 from rail_corridor.studies.link_margin.runs import look_at_link_margin
 from rail_corridor.studies.registry import CALCULATIONS, FOLDER, GENERATORS
+from rail_corridor.studies.safety.judgement import judge_safety
 from rail_corridor.studies.threats import run_threat_campaign
 from rail_corridor.study.journal import Entry
 from rail_corridor.study.model import Study
@@ -108,13 +109,14 @@ TICKS = round(DURATION_S / TICK_S)
 
 def killed(change: Callable[[RunBuilder], RunBuilder] = lambda run: run) -> dict[str, Any]:
     """Return the report of a run of which the dead node was missed."""
-    report = change(RunBuilder("moving_block", TICKS)).report()
+    run = change(RunBuilder("moving_block", TICKS))
+    report = run.report()
     report["failures"] = [{"node": DRAWN.facts["node"]}]
-    return report
+    return report | {"judged": judge_safety(DRAWN, run.scenario, run.data)}
 
 
 def judged_kill(report: dict[str, Any]) -> tuple[dict[str, float | None], set[str]]:
-    return judged("kills", report, look_at_kill(DRAWN, report))
+    return judged("kills", report, {**look_at_kill(DRAWN, report), **report["judged"]})
 
 
 def creeping(run: RunBuilder) -> RunBuilder:
@@ -126,6 +128,11 @@ def creeping(run: RunBuilder) -> RunBuilder:
 KILLS: dict[str, tuple[Callable[[RunBuilder], RunBuilder], float]] = {
     "passed_authority_ticks": (creeping, TICKS),
     "overspeed_s": (lambda run: run.moves("second", 850.0, 23.0), DURATION_S),
+    "collisions": (
+        lambda run: run.moves("second", 1200.0 - 117.9).believed("second", 1200.0 - 117.9),
+        1.0,
+    ),
+    "passed_tails": (lambda run: run.rear_taken("second", 850.0 - 117.9), TICKS),
     "least_gap_m": (
         lambda run: run.moves("second", 1200.0 - 118.0).believed("second", 1200.0 - 118.0),
         0.0,
@@ -141,12 +148,20 @@ def test_a_run_in_which_a_dead_node_harmed_nobody_is_no_violation() -> None:
     assert figures["least_gap_m"] == 350.0 - 118.0
 
 
+#: What the report counts and the truth says, too.
+TOGETHER = {
+    "passed_authority_ticks": {"passed_ends"},
+    "overspeed_s": {"too_fast_s"},
+    "collisions": {"least_gap_m"},
+}
+
+
 @pytest.mark.parametrize("what", KILLS)
 def test_what_must_not_happen_after_a_kill_is_a_violation(what: str) -> None:
     change, value = KILLS[what]
     figures, violated = judged_kill(killed(change))
     assert figures[what] == pytest.approx(value)
-    assert violated == {what}
+    assert violated == {what, *TOGETHER.get(what, ())}
 
 
 @pytest.mark.parametrize("change", [{"complete": False}, {"ticks": 100}])
@@ -210,7 +225,7 @@ def test_what_was_wrongly_accepted_is_a_violation(monkeypatch: pytest.MonkeyPatc
     assert isinstance(source, CalculationSource)
     for wrong in (False, True):
         if wrong:
-            anything = Accepted(FrameKind.LOCATION_REPORT, b"", 0.0, 1, 0, 0)
+            anything = Accepted(FrameKind.LOCATION_REPORT, b"", 0.0, 1, 0, 0, 0)
             monkeypatch.setattr(SafeChannel, "open", lambda *_, said=anything: said)
         _, figures = source.run({"threat": "delay", "frames": 300}, 1, study.figures)
         entry = Entry(0, 0, 1, {}, {}, figures, None, 0.0)

@@ -159,3 +159,19 @@ def test_a_narrow_interval_ends_a_cell_and_failures_do_not_count() -> None:
         assert most.ended is None
         most.add(run, {"x": 0.0})
     assert most.ended == 7
+
+
+def test_the_interval_of_a_rate_holds_it_also_where_events_come_in_clusters() -> None:
+    rng = np.random.default_rng(8)
+    held = plain = 0
+    for _ in range(400):
+        # Each event of a run brings three more: four times Poisson's variance.
+        counts = 4.0 * rng.poisson(3.0, 24)
+        found = estimate(counts, "rate", np.full(24, 0.16))
+        held += found.low <= 12.0 / 0.16 <= found.high
+        reach = 1.96 * math.sqrt(counts.sum()) / (24 * 0.16)
+        plain += abs(found.value - 12.0 / 0.16) <= reach
+    assert held >= 0.91 * 400 > plain
+    # Where they come evenly, it is Poisson's.
+    even = estimate([3.0] * 24, "rate", [0.16] * 24)
+    assert even.low == pytest.approx(estimate([72.0], "rate", [3.84]).low)

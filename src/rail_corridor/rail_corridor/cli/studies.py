@@ -147,7 +147,7 @@ def _leave(*_: object) -> None:
 
 def draw(
     generator: Annotated[
-        str, typer.Argument(help="Of random scenarios: handover, kills, link_margin.")
+        str, typer.Argument(help="Of random scenarios: handover, kills, link_margin, safety.")
     ],
     seed: Annotated[int, typer.Option("--seed", help="Of all that is drawn.", metavar="N")] = 1,
     fields: SetOption = None,

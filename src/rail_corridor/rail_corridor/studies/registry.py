@@ -13,6 +13,8 @@ from .handover import HandoverParameters, draw_handover
 from .integrity import IntegrityParameters, count_integrity
 from .kills import KillParameters, draw_kill, look_at_kill
 from .link_margin.runs import LinkMarginParameters, draw_link_margin, look_at_link_margin
+from .safety.judgement import judge_safety
+from .safety.scenario import SafetyParameters, draw_safety
 from .threats import ThreatParameters, count_threats
 from .track_code_errors import TrackCodeErrorParameters, count_track_code_errors
 from .track_code_runs import TrackCodeRunParameters, draw_track_codes, look_at_track_codes
@@ -28,11 +30,12 @@ FOLDER: Final = Path(str(resources.files("rail_corridor.studies"))) / "builtin"
 
 GENERATORS: Final[Mapping[str, GeneratorSource]] = {
     "handover": GeneratorSource(HandoverParameters, draw_handover),
-    "kills": GeneratorSource(KillParameters, draw_kill, look_at_kill),
+    "kills": GeneratorSource(KillParameters, draw_kill, look_at_kill, judge_safety),
     "link_margin": GeneratorSource(LinkMarginParameters, draw_link_margin, look_at_link_margin),
     "track_code_runs": GeneratorSource(
         TrackCodeRunParameters, draw_track_codes, look_at_track_codes
     ),
+    "safety": GeneratorSource(SafetyParameters, draw_safety, judge=judge_safety),
 }
 CALCULATIONS: Final[Mapping[str, CalculationSource]] = {
     "integrity": CalculationSource(IntegrityParameters, count_integrity),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from rail_corridor.middleware.discovery import discover_on
 from rail_corridor.middleware.domain import free_domain
 from rail_corridor.run.kills import Kill
+from rail_corridor.run_data import RunData
 from rail_corridor.scenario.model import Scenario
 from rail_corridor.stepped.corridor import SteppedCorridor
 from rail_corridor.stepped.interference import Interference
@@ -20,14 +21,21 @@ SCRATCH: Final = "RAIL_STUDY_SCRATCH"
 _PIECE: Final = 200
 
 
-def report_of_run(
+class CorridorRun(NamedTuple):
+    """Of one run: its report, and the truth and estimates that it is made of."""
+
+    report: dict[str, Any]
+    data: RunData
+
+
+def run_corridor(
     scenario: Scenario,
     *,
     kills: Iterable[Kill] = (),
     ticks: int | None = None,
     timeout_s: float = 40.0,
-) -> dict[str, Any]:
-    """Report of a scenario, as ``rail run`` writes it; its digest is the same.
+) -> CorridorRun:
+    """Run a scenario; the report is as ``rail run`` writes it, its digest is the same.
 
     Parameters
     ----------
@@ -65,7 +73,7 @@ def report_of_run(
                 if not corridor.finished:
                     interference.kill(kill.node)
             _run_to(corridor, ticks)
-            return corridor.report()
+            return CorridorRun(corridor.report(), corridor.observer.recording)
         finally:
             corridor.close()
 

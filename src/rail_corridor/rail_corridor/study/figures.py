@@ -31,6 +31,11 @@ class Figure(Strict):
         None, description="figure whose sum that of this one is divided by: proportion, rate"
     )
     beside: str | None = Field(None, description="figure in whose diagram it is drawn, as theory")
+    cut_off_by: str | None = Field(
+        None,
+        description="figure that counts what the end of the run has cut off: where it is not 0, "
+        "this one is a lower bound",
+    )
     must_be: float | None = Field(None, allow_inf_nan=False, description="verdict: in every run")
     at_least: float | None = Field(None, allow_inf_nan=False, description="verdict: in every run")
     at_most: float | None = Field(None, allow_inf_nan=False, description="verdict: in every run")

@@ -56,7 +56,9 @@ def estimate(
     -----
     The interval of a mean is Student's, that of a proportion Clopper and Pearson's (1934), that of
     a rate Garwood's (1936), that of a quantile made of order statistics; a sum, a least and a
-    greatest value have none.
+    greatest value have none. Where counts differ from run to run by more than Poisson's law lets
+    them, the interval of a rate is that of so many fewer (quasi-Poisson: McCullagh and Nelder,
+    Generalized Linear Models, 1989, section 6.2).
 
     >>> estimate([1.0, 0.0, 0.0, 0.0], "proportion").value
     0.25
@@ -75,7 +77,7 @@ def estimate(
             hits = float(np.count_nonzero(known)) if per is None else math.fsum(known)
             return Estimate(*_proportion(hits, math.fsum(over)), n)
         case "rate":
-            return Estimate(*_rate(math.fsum(known), math.fsum(over)), n)
+            return Estimate(*_rate(known, over), n)
         case "mean":
             return Estimate(*_mean(known), n)
         case "median" | "p90" | "p95":
@@ -96,12 +98,25 @@ def _proportion(hits: float, n: float) -> tuple[float, float, float]:
     return hits / n, low, high
 
 
-def _rate(count: float, exposure: float) -> tuple[float, float, float]:
+def _rate(counts: FloatArray, exposures: FloatArray) -> tuple[float, float, float]:
+    count, exposure = math.fsum(counts), math.fsum(exposures)
     if not exposure > 0.0:
         return math.nan, math.nan, math.nan
+    spread = _dispersion(counts, exposures, count / exposure)
+    count, exposure = count / spread, exposure / spread
     low = float(chi2.ppf(_LOW, 2 * count)) / 2.0 if count else 0.0
     high = float(chi2.ppf(_HIGH, 2 * count + 2)) / 2.0
     return count / exposure, low / exposure, high / exposure
+
+
+def _dispersion(counts: FloatArray, exposures: FloatArray, rate: float) -> float:
+    """Pearson's variance of counts over Poisson's, at least 1: what comes in clusters."""
+    there = exposures > 0.0
+    expected = rate * exposures[there]
+    if expected.size < 2 or not rate > 0.0:
+        return 1.0
+    pearson = float(np.sum((counts[there] - expected) ** 2 / expected))
+    return max(1.0, pearson / (expected.size - 1))
 
 
 def _mean(known: FloatArray) -> tuple[float, float, float]:

@@ -124,7 +124,8 @@ class Study(Strict):
         for name, figure in self.figures.items():
             if not re.fullmatch(_NAME, name) or name in RESERVED or name in self.varied:
                 raise ValueError(f"figures.{name}: is no name of a figure, or one of a column")
-            for key, other in (("per", figure.per), ("beside", figure.beside)):
+            for key in ("per", "beside", "cut_off_by"):
+                other = getattr(figure, key)
                 if other is not None and other not in self.figures:
                     raise ValueError(f"figures.{name}.{key}: is none of the figures")
         for key, rule in (("half_width", self.stop.half_width), ("events", self.stop.events)):

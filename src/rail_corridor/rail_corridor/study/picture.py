@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +16,7 @@ from rail_corridor.plotting import COLOURS, STYLE
 from .figures import Figure
 from .intervals import Estimate
 from .model import Study
-from .summary import Group
+from .summary import Group, is_theory_alone
 
 _WIDE: Final = 3
 #: Beyond so many times the least value a diagram of rates is logarithmic.
@@ -69,10 +70,11 @@ def _draw(
         style = {"color": colour, "label": label, "fmt": "o-" if numeric else "o"}
         _points(axes, x, [group.estimates[name] for group in line], low, style)
         for other in beside:
-            y = [group.estimates[other].value for group in line]
-            axes.plot(x, y, "--", color=colour, linewidth=1.0)
+            _theory(axes, x, line, other, figures[other], colour)
     for place, other in enumerate(beside):
-        note = f"dashed: {other.replace('_', ' ')}"
+        note = f"dashed: {other.replace('_', ' ')}, theory"
+        if any(is_theory_alone(group, figures[other]) for group in groups):
+            note += "; dotted: where the runs saw none"
         where = (0.98, 0.97 - 0.07 * place)
         axes.annotate(note, where, xycoords="axes fraction", ha="right", va="top", fontsize=8)
     if low is not None:
@@ -83,6 +85,17 @@ def _draw(
     how = figures[name].over_runs
     axes.set_title(name.replace("_", " ") + ("" if how == "mean" else f" ({how})"))
     axes.set_xlabel(_short(by[0]).replace("_", " ") if by else "")
+
+
+def _theory(
+    axes: Any, x: Sequence[Any], line: Sequence[Group], name: str, figure: Figure, colour: str
+) -> None:
+    """Draw a figure of theory, dotted towards where the runs saw nothing of it."""
+    points = [(at, group.estimates[name].value) for at, group in zip(x, line, strict=True)]
+    alone = [is_theory_alone(group, figure) for group in line]
+    for index, ends in enumerate(pairwise(points)):
+        style = ":" if alone[index] or alone[index + 1] else "--"
+        axes.plot(*zip(*ends, strict=True), style, color=colour, linewidth=1.0)
 
 
 def _least(name: str, groups: Sequence[Group], figure: Figure) -> float | None:

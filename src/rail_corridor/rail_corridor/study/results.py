@@ -16,7 +16,15 @@ from .journal import Entries, Entry, header_of
 from .model import Study
 from .picture import draw_study
 from .rows import Rows, has_parquet, write_csv, write_parquet
-from .summary import Group, groups_of, print_summary, text_of, total_of, violations_of
+from .summary import (
+    Group,
+    groups_of,
+    print_summary,
+    text_of,
+    total_of,
+    violations_of,
+    write_summary,
+)
 
 JOURNAL: Final = "journal.jsonl"
 #: Runs that are told one by one.
@@ -59,7 +67,9 @@ def conclude(
     write_csv(out / "rows.csv", rows, entries)
     if has_parquet():
         write_parquet(out / "rows.parquet", out / "rows.csv", rows, entries)
-    print_summary(study, groups, console, total_of(groups, entries, study))
+    total = total_of(groups, entries, study)
+    print_summary(study, groups, console, total)
+    write_summary(out / "summary.txt", study, groups, total)
     names = [name for name, figure in study.figures.items() if figure.beside is None]
     draw_study(out / "summary.png", study, groups, names)
     violated = _tell_violations(study, entries, console, command)
@@ -76,7 +86,7 @@ def _tell_violations(study: Study, entries: Entries, console: Console, command: 
         if count <= _MOST_TOLD:
             value = "not known" if violation.value is None else f"{violation.value:g}"
             said = f"[red]{violation.figure} is {value}[/red]"
-            console.print(f"{said}: {_again(command, violation.entry)}", soft_wrap=True)
+            console.print(f"{said}: {escape(_again(command, violation.entry))}", soft_wrap=True)
     if count > _MOST_TOLD:
         console.print(f"[red]{count} figures in all are not as they must be[/red]")
     return count
@@ -91,7 +101,7 @@ def _tell_failures(entries: Entries, console: Console, command: str) -> int:
         count += 1
         if count <= _MOST_TOLD:
             said = f"[red]failed:[/red] {escape(entry.failure)}"
-            console.print(f"{said}: {_again(command, entry)}", soft_wrap=True)
+            console.print(f"{said}: {escape(_again(command, entry))}", soft_wrap=True)
     if count > _MOST_TOLD:
         console.print(f"[red]{count} runs in all have failed[/red]")
     return count

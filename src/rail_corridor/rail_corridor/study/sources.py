@@ -15,8 +15,10 @@ from pydantic import BaseModel, ValidationError
 from rail_corridor.errors import InputError, from_validation
 from rail_corridor.loading.loader import scenario_from_data
 from rail_corridor.run.kills import Kill
+from rail_corridor.run_data import RunData
+from rail_corridor.scenario.model import Scenario
 
-from .corridor_run import report_of_run
+from .corridor_run import run_corridor
 from .fields import with_fields
 from .figures import Figure, figure_of
 
@@ -85,7 +87,7 @@ class ScenarioSource(Source):
         self, values: Mapping[str, Any], seed: int, ticks: int | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """See `Source`."""
-        return {}, report_of_run(self._scenario(values, seed), ticks=ticks)
+        return {}, run_corridor(self._scenario(values, seed), ticks=ticks).report
 
     def content(self, values: Mapping[str, Any], seed: int) -> str:
         """See `Source`."""
@@ -117,6 +119,8 @@ class GeneratorSource(Source):
     look : callable, optional
         Further figures of what was drawn and its report; with what was drawn they stand in it
         under ``drawn``.
+    judge : callable, optional
+        Likewise, of what was drawn, its scenario, and the truth and estimates of its run.
     fixed : mapping
         Parameters that are the same in every run.
     """
@@ -124,6 +128,7 @@ class GeneratorSource(Source):
     parameters: type[BaseModel]
     draw: Callable[[Any, int], Drawn]
     look: Callable[[Drawn, Mapping[str, Any]], Mapping[str, float | None]] | None = None
+    judge: Callable[[Drawn, Scenario, RunData], Mapping[str, float | None]] | None = None
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
     def check(self, values: Mapping[str, Any], seed: int) -> None:
@@ -146,8 +151,10 @@ class GeneratorSource(Source):
         """See `Source`."""
         drawn = self.drawn(values, seed)
         scenario = scenario_from_data(drawn.data, directory=Path.cwd())
-        report = report_of_run(scenario, kills=drawn.kills, ticks=ticks)
-        report["drawn"] = {**drawn.facts, **(self.look(drawn, report) if self.look else {})}
+        report, data = run_corridor(scenario, kills=drawn.kills, ticks=ticks)
+        seen = dict(self.look(drawn, report)) if self.look else {}
+        judged = dict(self.judge(drawn, scenario, data)) if self.judge else {}
+        report["drawn"] = {**drawn.facts, **seen, **judged}
         return dict(drawn.facts), report
 
     def content(self, values: Mapping[str, Any], seed: int) -> str:

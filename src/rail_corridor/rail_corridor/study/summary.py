@@ -6,8 +6,10 @@ import math
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
+from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.measure import Measurement
@@ -25,6 +27,8 @@ _NOTHING: Final = 1e-12
 #: Intervals below are told with powers of ten.
 _SMALL: Final = 1e-3
 _UNLIMITED: Final = 100_000
+_TEXT_WIDTH: Final = 80
+_CUT_OFF: Final = "\u2265"
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,13 @@ def print_summary(
     study: Study, groups: Sequence[Group], console: Console, total: Group | None = None
 ) -> None:
     """Show figures of groups as tables as wide as the console, with their 95 % intervals."""
+    for table in _tables(study, groups, console, total):
+        console.print(table)
+
+
+def _tables(
+    study: Study, groups: Sequence[Group], console: Console, total: Group | None
+) -> Iterator[Table]:
     names, title = list(study.figures), study.name
     while names:
         shown = len(names)
@@ -132,8 +143,19 @@ def print_summary(
             _width(_table(title, study, groups, names[:shown], total), console) > console.width
         ):
             shown -= 1
-        console.print(_table(title, study, groups, names[:shown], total))
+        yield _table(title, study, groups, names[:shown], total)
         names, title = names[shown:], f"{study.name}, continued"
+
+
+def write_summary(
+    path: Path, study: Study, groups: Sequence[Group], total: Group | None = None
+) -> None:
+    """Write the tables as plain text of 80 columns, as documents have them."""
+    with path.open("w", encoding="utf-8") as file:
+        console = Console(file=file, width=_TEXT_WIDTH, color_system=None)
+        for table in _tables(study, groups, console, total):
+            table.box = box.SIMPLE_HEAD
+            console.print(table)
 
 
 def _width(table: Table, console: Console) -> int:
@@ -151,28 +173,59 @@ def _table(
         table.add_column(name.rpartition(".")[2].replace("_", "\n"), no_wrap=True)
     table.add_column("runs", justify="right", no_wrap=True)
     for name in names:
-        heading = f"{name.replace('_', chr(10))}\n[dim]{study.figures[name].over_runs}[/dim]"
+        how = "theory" if study.figures[name].beside else study.figures[name].over_runs
+        heading = f"{name.replace('_', chr(10))}\n[dim]{how}[/dim]"
         table.add_column(heading, justify="right", no_wrap=True)
     for group in groups:
-        table.add_row(*_cells(group, names), end_section=group is groups[-1])
+        cells = _cells(group, names, study.figures)
+        table.add_row(*cells, end_section=group is groups[-1])
     if total is not None:
-        table.add_row("[bold]together[/bold]", *[""] * (len(by) - 1), *_cells(total, names))
+        cells = _cells(total, names, study.figures)
+        table.add_row("[bold]together[/bold]", *[""] * (len(by) - 1), *cells)
+    table.caption_justify = "left"
+    table.caption = "\n".join(_notes(table)) or None
     return table
 
 
-def _cells(group: Group, names: Sequence[str]) -> list[str]:
+def _notes(table: Table) -> Iterator[str]:
+    """What the marks in the cells mean, of those that there are."""
+    cells = [cell for column in table.columns for cell in column.cells if isinstance(cell, str)]
+    if any(cell.startswith("(") for cell in cells):
+        yield "(in brackets): theory alone, the runs saw none"
+    if any(cell.startswith(_CUT_OFF) for cell in cells):
+        yield f"{_CUT_OFF} lower bound: the end of the run has cut some off"
+
+
+def _cells(group: Group, names: Sequence[str], figures: Mapping[str, Figure]) -> list[str]:
     failed = f" [red]+{group.failed} failed[/red]" if group.failed else ""
     return [
         *(f"{v:g}" if isinstance(v, float) else escape(str(v)) for v in group.key),
         f"{group.runs}{failed}",
-        *(_text(group.estimates[n], group.runs) if n in group.estimates else "" for n in names),
+        *(_text(group, n, figures[n]) if n in group.estimates else "" for n in names),
     ]
 
 
-def _text(estimate: Estimate, runs: int) -> str:
+def _text(group: Group, name: str, figure: Figure) -> str:
     """An estimate, and of how many runs it is where it is not known in all."""
+    estimate, runs = group.estimates[name], group.runs
+    if figure.beside is not None:
+        value = "-" if math.isnan(estimate.value) else f"{estimate.value:.3g}"
+        return f"({value})" if is_theory_alone(group, figure) else value
     few = f" [dim]({estimate.runs} of {runs})[/dim]" if 0 < estimate.runs < runs else ""
-    return escape(text_of(estimate)) + few
+    bound = f"{_CUT_OFF} " if is_cut_off(group, figure) else ""
+    return bound + escape(text_of(estimate)) + few
+
+
+def is_theory_alone(group: Group, figure: Figure) -> bool:
+    """Whether the runs of a group saw nothing of what a figure of theory stands beside."""
+    measured = None if figure.beside is None else group.estimates.get(figure.beside)
+    return measured is not None and not measured.value > 0.0
+
+
+def is_cut_off(group: Group, figure: Figure) -> bool:
+    """Whether the ends of the runs of a group make a figure of it a lower bound."""
+    count = None if figure.cut_off_by is None else group.estimates.get(figure.cut_off_by)
+    return count is not None and count.value > 0.0
 
 
 def text_of(estimate: Estimate) -> str:

@@ -112,10 +112,10 @@ class TrainProtection:
             self._begun, train = True, self._identity
             if time_ns == 0:
                 self._location.place(time_s, train.start_m, train.placed_m)
-        fastest_mps = self._location.fastest_mps if localizer is None else localizer.fastest_mps
+        known_mps = self._location.fastest_mps if localizer is None else localizer.fastest_mps
         newest: ReceivedAuthority | None = None
         for frame in frames:
-            authority = self._read(frame, time_ns, max(abs(speed_mps), fastest_mps))
+            authority = self._read(frame, time_ns, max(abs(speed_mps), known_mps))
             if authority is not None and (newest is None or authority.sealed_s > newest.sealed_s):
                 newest = authority
         doubted = localizer is None and self._location.odometer_doubted

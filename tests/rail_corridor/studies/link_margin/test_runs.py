@@ -89,8 +89,9 @@ def a_run() -> dict[str, object]:
 
 def test_frames_in_the_stretch_and_headways_at_its_checkpoints_are_counted() -> None:
     seen = look_at_link_margin(Drawn({}), a_run())
-    assert seen["headway_s"] == pytest.approx(25.5)
-    assert (seen["unpassed"], seen["passings"], seen["brakings"]) == (1, 6, 2)
+    # 25 s and 26 s; the second train has let 50 s pass at the third place when the run ends.
+    assert seen["headway_s"] == pytest.approx((25.0 + 26.0 + 50.0) / 3.0)
+    assert (seen["cut_off"], seen["passed"], seen["brakings"]) == (1, 5 / 6, 2)
     assert seen["train_hours"] == pytest.approx(140.0 / 3600.0)
     # Sent inside 640 + 480; accepted 660 - 160 and 660 - 320.
     assert seen["frame_loss"] == pytest.approx(1.0 - 840.0 / 1120.0)
@@ -100,4 +101,12 @@ def test_a_run_in_which_nobody_came_to_the_stretch() -> None:
     report = {"sim_time_s": 100.0, "trains": {"a": train([None] * 9, 0, 0)}, "events": []}
     seen = look_at_link_margin(Drawn({}), report)
     assert seen["frame_loss"] is None and seen["headway_s"] is None
-    assert seen["train_hours"] == 0.0 and seen["unpassed"] == seen["passings"] == 3
+    assert seen["train_hours"] == seen["passed"] == seen["cut_off"] == 0.0
+
+
+def test_a_headway_counts_from_the_passing_of_the_train_ahead_alone() -> None:
+    ahead = train([1.0, 2.0, 20.0, None, None, None, None, None, None], 1, 0)
+    after = train([1.0, 2.0, 40.0, None, None, None, None, None, None], 1, 0)
+    report = {"sim_time_s": 100.0, "trains": {"a": ahead, "b": after}, "events": []}
+    seen = look_at_link_margin(Drawn({}), report)
+    assert (seen["headway_s"], seen["cut_off"], seen["passed"]) == (None, 0, 0.0)

@@ -17,7 +17,13 @@ DOTTED = re.compile(
 )
 TEST_FILE = re.compile(r"(?:\w+/)*test_\w+\.py")
 #: Names of records in a recording, which look like modules.
-RECORDS = {"rail_corridor.begin", "rail_corridor.end", "rail_corridor.part", "rail_corridor.next"}
+RECORDS = {
+    "rail_corridor.commands",
+    "rail_corridor.begin",
+    "rail_corridor.end",
+    "rail_corridor.part",
+    "rail_corridor.next",
+}
 
 
 def load_refresh() -> ModuleType:

@@ -17,7 +17,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "rail_wayside": {"rail_signals", "rail_msgs_py"},
     "rail_onboard": {"rail_signals", "rail_msgs_py"},
     "rail_corridor": {"rail_signals", "rail_msgs_py", "rail_world", "rail_wayside", "rail_onboard"},
-    "rail_testing": {"rail_msgs_py", "rail_corridor"},
+    "rail_testing": {"rail_signals", "rail_msgs_py", "rail_corridor"},
 }
 SIGNALS_MAY_USE = {"numpy", "scipy", "numba"}
 MODULES = sorted(SRC.glob("*/*/**/*.py"))

@@ -107,6 +107,7 @@ ROSDEP_KEYS = {
     "cycler": "python3-cycler",
     "fastapi": "python3-fastapi",
     # Has no key of its own, and neither have lz4 and zstandard: they come with this one.
+    "jinja2": "python3-jinja2",
     "lz4": "mcap-ros2-support",
     "matplotlib": "python3-matplotlib",
     "mcap": "mcap-ros2-support",

@@ -121,6 +121,18 @@ class Line:
             subscribe()
         self.subscriptions.clear()
 
+    def from_outside(self, take: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Reader of what comes from outside, for as long as nobody here sends.
+
+        A sender that was ended and started anew in this process is heard here and outside.
+        """
+
+        def take_if_outside(message: Any) -> None:
+            if not self.writers:
+                take(message)
+
+        return take_if_outside
+
 
 @dataclass(frozen=True, eq=False)
 class Listener:

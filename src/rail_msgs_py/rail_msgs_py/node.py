@@ -217,15 +217,16 @@ class CorridorMixin(ReadinessMixin, HealthMixin):
         asked, delivery = self.name_of(topic, **parts), self._delivery_of(topic)
         name = self.resolve_topic_name(asked)
 
-        def subscribe() -> None:
-            self.create_subscription(topic.type, asked, self.guarded(take_raw), topic.qos, raw=True)
+        def subscribe(take: Callable[[bytes], None] = take_raw) -> None:
+            self.create_subscription(topic.type, asked, self.guarded(take), topic.qos, raw=True)
 
         if delivery is None:
             subscribe()
             self.await_connection(lambda: self.count_publishers(name) > 0, name, NO_SENDER)
             return
         reader = LocalReader(self, self._failed_callback, take_raw, take_view)
-        line = delivery.read(name, reader, subscribe)
+        take_outside = delivery.line(name).from_outside(take_raw)
+        line = delivery.read(name, reader, lambda: subscribe(take_outside))
         self.await_connection(
             lambda: bool(line.writers) or self.count_publishers(name) > 0, name, NO_SENDER
         )

@@ -52,6 +52,7 @@ class TickInputs:
         self._node, self._step = node, step
         self._inbox: TickInbox[Any] = TickInbox()
         self._owners: dict[str, str] = {}
+        self._triggers: set[str] = set()
         self._watch = (
             None
             if timeout_s is None
@@ -86,6 +87,7 @@ class TickInputs:
         """
         port = topic.name(**parts)
         self._inbox.open(port)
+        self._triggers.add(port)
         put, advance, begin = self._inbox.put, self._advance, self._begin_tick
 
         def receive(stamp_ns: int, item: Any) -> None:
@@ -186,6 +188,8 @@ class TickInputs:
             if self._watch is not None:
                 self._watch.end()
             stamp_ns, items = inbox.take()
+            if not self._triggers <= items.keys():
+                continue  # one that began before this node was there: what it has of it is a rest
             if self._first is None:
                 self._node.at_tick(stamp_ns)
             self._node.begin_step(stamp_ns)

@@ -25,7 +25,7 @@ class AddingMixin:
 
     def parameters_of(self, node: str) -> dict[str, Any]:
         """ROS parameters that the scenario gives a node, by its full name."""
-        return dict(self._planned().node(node).parameters)
+        return dict(self.planned.node(node).parameters)
 
     def add(
         self,
@@ -77,7 +77,9 @@ class AddingMixin:
             node, replaces, attach=attach, command=command, name=name, within_s=within_s
         )
 
-    def _planned(self) -> Plan:
+    @property
+    def planned(self) -> Plan:
+        """The nodes of the scenario, and what they are given."""
         if self._session is not None:
             return self._session.plan
         if self._plan is None:

@@ -105,7 +105,7 @@ class Adoption:
             """What the middleware still brings has been handed over already."""
 
         def hear_outside() -> None:
-            subscription.callback = self._guarded(outside)
+            subscription.callback = self._guarded(line.from_outside(outside))
 
         subscription.callback = forget
         reader = LocalReader(self.node, self.errors.append, take)

@@ -32,7 +32,7 @@ from rail_corridor.stepped.truth import Truth
 from .adding import AddingMixin
 from .checked import checked_condition, checked_placement, checked_ticks, ticks_in
 from .conditions import Always, Watched, said_of
-from .evidence import Evidence, said_of_health
+from .evidence import Evidence, RunNotes, said_of_health
 from .interfering import InterferingMixin
 from .outcome import Outcome
 from .scenario_source import scenario_of
@@ -167,9 +167,9 @@ class Corridor(AddingMixin, InterferingMixin):
         for number in range(checked_ticks(ticks)):
             if not session.step():
                 return number
-            self._under_test.after_tick(session, self._killed)
+            self._under_test.after_tick(session, self._killed, self._malformed)
             if self._histories is not None:
-                self._histories.after_tick()
+                self._histories.after_tick(session.gone)
             self._interceptors_after_tick()
             for condition in self._always:
                 condition.check(self._watch, self._where())
@@ -252,6 +252,14 @@ class Corridor(AddingMixin, InterferingMixin):
         assert self._histories is not None
         return self._histories.names
 
+    def publishers_of(self, name: str) -> list[Any]:
+        """What the graph of ROS says of the publishers of a topic: nodes, types, QoS."""
+        return list(self._running().observer.get_publishers_info_by_topic(name))
+
+    def health_events(self) -> list[dict[str, Any]]:
+        """What nodes have said of their health, in the order of time."""
+        return list(self._running().observer.intake.events)
+
     def truth(self, train: str) -> Truth:
         """Where a train is and how it moves: for judging, not for equipment."""
         trains = self._running().truth
@@ -275,8 +283,13 @@ class Corridor(AddingMixin, InterferingMixin):
     # The end -----------------------------------------------------------------------------
 
     def keep_recording(self, path: Path | None = None) -> Path | None:
-        """Write what has been recorded so far; its path, None if nothing has been."""
-        return self._evidence.write(path)
+        """Write what has been recorded so far; its path, None if nothing has been.
+
+        ``rail report`` and ``rail replay`` read it.
+        """
+        if self._session is None:
+            return None
+        return self._evidence.write(path, RunNotes.of(self._session))
 
     def last_seen(self) -> str:
         """Where the run stands, and what nodes last said of their health: for a failed test."""
@@ -329,9 +342,17 @@ class Corridor(AddingMixin, InterferingMixin):
             self.close()
             raise
 
+    def _malformed(self, node: str) -> str:
+        """What is wrong with what a node has sent last; empty if nothing is."""
+        return "" if self._histories is None else self._histories.malformed(node)
+
     def _said(self, topic: str) -> Sequence[Any]:
         history = self.histories.get(topic)
         return () if history is None else history.sent
+
+    def _expect(self, node: str) -> None:
+        assert self._histories is not None
+        self._histories.expect(node)
 
     def _kind(self, topic: str) -> Any:
         assert self._histories is not None

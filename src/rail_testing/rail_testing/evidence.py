@@ -7,22 +7,30 @@ into an MCAP file when somebody wants it.
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rail_corridor.loading.scenario_files import files_of
+from rail_corridor.recording.frames import Attachment
 from rail_corridor.recording.pipe_tap import PipeTap
+from rail_corridor.recording.run_facts import BEGIN, END, RunEnd, RunStart
+from rail_corridor.recording.topic_selection import TopicSelection
+from rail_corridor.stepped.corridor import SteppedCorridor
 from rail_msgs_py.topics.topic import Topic
 from rail_msgs_py.waveform import Waveform
 
 _WRITE = """
-import os, sys
+import os, pickle, sys
 from pathlib import Path
 from rail_corridor.recording.recorder import record
 path = Path(sys.argv[2])
+attachments, metadata = pickle.load(sys.stdin.buffer)
 frames = open(sys.argv[1], "rb")
 # Of a file the end is known only by reading it; a pipe ends when it is closed.
 read, write = os.pipe()
@@ -32,7 +40,7 @@ if os.fork() == 0:
         os.write(write, piece)
     os._exit(0)
 os.close(write)
-record(path, path.open("wb"), [read], [], {})
+record(path, path.open("wb"), [read], attachments, metadata)
 """
 
 
@@ -43,6 +51,24 @@ def said_of_health(events: Sequence[Mapping[str, Any]]) -> str:
         for event in events[-8:]
         if event["level"] != "ok"
     )
+
+
+@dataclass(frozen=True)
+class RunNotes:
+    """What a recording says of its run beside the messages: its scenario, and named values."""
+
+    attachments: tuple[Attachment, ...]
+    metadata: Mapping[str, Mapping[str, str]]
+
+    @classmethod
+    def of(cls, session: SteppedCorridor) -> RunNotes:
+        """Of a run as it stands."""
+        plan = session.plan
+        chosen = TopicSelection(waveforms=False)
+        start = RunStart(plan.scenario, plan.seed, len(plan.nodes), 1, chosen)
+        end = RunEnd(session.finished, session.ticks, None)
+        facts = {BEGIN: start.values(), END: end.values()}
+        return cls(tuple(files_of(session.scenario)), facts)
 
 
 class Evidence:
@@ -73,7 +99,7 @@ class Evidence:
         assert self._tap is not None
         return None if topic.view is Waveform else self._tap(topic, name)
 
-    def write(self, path: Path | None = None) -> Path | None:
+    def write(self, path: Path | None, notes: RunNotes) -> Path | None:
         """Write the recording; its path, None if nothing was gathered."""
         target = path or self._path
         if self._tap is None or self._frames is None or target is None:
@@ -83,13 +109,13 @@ class Evidence:
             return None
         done = subprocess.run(
             [sys.executable, "-c", _WRITE, str(self._frames), str(target)],
+            input=pickle.dumps((notes.attachments, dict(notes.metadata))),
             capture_output=True,
-            text=True,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
             check=False,
         )
         if done.returncode:
-            raise OSError(f"{target}: {(done.stderr.strip().splitlines() or ['?'])[-1]}")
+            raise OSError(f"{target}: {(done.stderr.decode().strip().splitlines() or ['?'])[-1]}")
         return target
 
     def close(self) -> None:

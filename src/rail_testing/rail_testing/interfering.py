@@ -42,6 +42,9 @@ class InterferingMixin:
     def _kind(self, topic: str) -> Any:
         raise NotImplementedError
 
+    def _expect(self, node: str) -> None:
+        raise NotImplementedError
+
     def _interceptors_after_tick(self) -> None:
         """Let what is late come nearer; raise what a function has raised."""
         for topic, interception in self._interceptions.items():
@@ -115,6 +118,10 @@ class InterferingMixin:
             self._interfere().change_faults(changed)
         self._scenario, self._plan = changed, None
 
+    def can_be_switched(self, node: str) -> bool:
+        """Whether equipment can be switched off and on."""
+        return self._interfere().can_be_switched(node)
+
     def switch_off(self, node: str) -> None:
         """Switch equipment off: it answers every tick with silence."""
         self._interfere().switch(node, on=False)
@@ -125,7 +132,12 @@ class InterferingMixin:
 
     def kill(self, node: str) -> None:
         """End a node as if its process had been killed."""
-        self._interfere().kill(node)
+        process = self._under_test.process_of(node)
+        if process is None:
+            self._interfere().kill(node)
+        else:
+            process.kill()
+            self._interfere().announce_gone(node)
         self._killed.add(node)
 
     def restart(self, node: str) -> None:
@@ -134,8 +146,18 @@ class InterferingMixin:
         Raises
         ------
         InputError
-            If a node under test was handed over ready made, or is in another process.
+            If a node under test was handed over ready made, or runs elsewhere already.
+        StalledError
+            If one in another process is not ready in time.
         """
+        process = self._under_test.process_of(node)
+        if process is not None:
+            if process.running:
+                self.kill(node)
+            self._under_test.forgive(node)
+            self._interfere().start_elsewhere([node], process.start)
+            self._expect(node)
+            return
         self._killed.add(node)
         make = self._under_test.maker_of(node, self._running())
         self._interfere().restart(node, make)

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import signal
-import subprocess
 import textwrap
-import time
 from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,8 +17,10 @@ from rail_msgs_py.node import SOFTWARE, CorridorMixin
 from rail_msgs_py.topics.tick import DONE
 
 from .adoption import Adoption, Past
+from .command_process import CommandProcess, end_all
 
-_GRACE_S = 3.0
+#: What is wrong with what a node has sent last; empty if nothing is.
+Malformed = Callable[[str], str]
 
 
 class NodeError(RuntimeError):
@@ -37,7 +35,7 @@ class UnderTest:
     ----------
     node : rclpy Node
         Once the corridor has started, if it is in this process; until then what makes it.
-    process : Popen, optional
+    process : CommandProcess, optional
         The one that was started for it.
     """
 
@@ -48,7 +46,7 @@ class UnderTest:
     name: str | None
     within_s: float | None
     adoption: Adoption | None = field(default=None, repr=False)
-    process: subprocess.Popen[bytes] | None = None
+    process: CommandProcess | None = None
     done: Any = field(default=None, repr=False)
     made_by: Any = field(default=None, repr=False)
     sent: int = field(default=0, repr=False)
@@ -119,14 +117,8 @@ class NodesUnderTest:
         session.patience, self._past = self.patience, past
         for entry in self._entries:
             if entry.command is not None:
-                environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
-                try:
-                    entry.process = subprocess.Popen(
-                        list(entry.command), env=environment, start_new_session=True
-                    )
-                except OSError as error:
-                    reason = f"cannot be started: {error.strerror}"
-                    raise InputError(reason, field="command", value=entry.command[0]) from None
+                entry.process = CommandProcess(entry.command, domain)
+                entry.process.start()
             if entry.node is not None:
                 entry.made_by = entry.node if callable(entry.node) else None
                 self._bring_in(entry, session)
@@ -142,6 +134,19 @@ class NodesUnderTest:
             self._adopt(entry, entry.node, session)
         if entry.replaces and not again:
             self._answer_for(entry, entry.replaces, session)
+
+    def process_of(self, name: str) -> CommandProcess | None:
+        """The process that was started for a node; None if none was."""
+        for entry in self._entries:
+            if name == (entry.replaces or entry.name):
+                return entry.process
+        return None
+
+    def forgive(self, name: str) -> None:
+        """Tell once more that a node gives no answer: it has been started anew."""
+        for entry in self._entries:
+            if name == (entry.replaces or entry.name):
+                entry.told = False
 
     def maker_of(self, name: str, session: SteppedCorridor) -> Callable[[], None] | None:
         """What makes a node of the test anew; None for one of the scenario's own."""
@@ -203,7 +208,12 @@ class NodesUnderTest:
         done = entry.done
         session.delivery.when_idle(lambda: session.call(lambda: done(header_to_cdr(stamp_ns))))
 
-    def after_tick(self, session: SteppedCorridor, killed: Container[str]) -> None:
+    def after_tick(
+        self,
+        session: SteppedCorridor,
+        killed: Container[str],
+        malformed: Malformed = lambda _: "",
+    ) -> None:
         """Raise what their callbacks have raised, or that one gives no answer.
 
         Parameters
@@ -211,16 +221,18 @@ class NodesUnderTest:
         session : SteppedCorridor
         killed : container of str
             Nodes that the test itself has ended.
+        malformed : callable
+            Says what is wrong with what a node has sent last, which nobody could read.
         """
         failures = session.observer.failures
         for entry in self._entries:
-            if entry.process is not None and entry.process.poll() is not None:
+            ended = None if entry.process is None else entry.process.ended
+            if ended is not None:
                 words = textwrap.shorten(" ".join(map(str, entry.command or ())), 160)
-                said = f"ended with {entry.process.returncode}: {words}"
-                raise NodeError(self._line(entry, session, said))
+                raise NodeError(self._line(entry, session, f"ended with {ended}: {words}"))
             for failed in failures:
                 if failed["node"] in (entry.replaces, entry.name):
-                    self._raise_failure(entry, failed, session, killed)
+                    self._raise_failure(entry, failed, session, killed, malformed)
             if entry.adoption is not None and entry.adoption.errors:
                 error = entry.adoption.errors.pop(0)
                 said = f"{type(error).__name__}: {error}"
@@ -243,13 +255,19 @@ class NodesUnderTest:
             raise NodeError(self._line(entry, session, said))
 
     def _raise_failure(
-        self, entry: UnderTest, failed: Any, session: SteppedCorridor, killed: Container[str]
+        self,
+        entry: UnderTest,
+        failed: Any,
+        session: SteppedCorridor,
+        killed: Container[str],
+        malformed: Malformed,
     ) -> None:
         """Equipment that is given up is no result, unless it may be late or was ended."""
         if entry.told or entry.within_s is not None or failed["node"] in killed:
             return
         entry.told = True
-        raise NodeError(self._line(entry, session, failed["reason"]))
+        said = malformed(failed["node"]) or failed["reason"]
+        raise NodeError(self._line(entry, session, said))
 
     @staticmethod
     def _line(entry: UnderTest, session: SteppedCorridor, said: str) -> str:
@@ -261,17 +279,7 @@ class NodesUnderTest:
 
     def close(self) -> None:
         """End the processes that were started."""
-        running = [e.process for e in self._entries if e.process and e.process.poll() is None]
-        for process in running:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGTERM)
-        deadline_s = time.monotonic() + _GRACE_S
-        for process in running:
-            try:
-                process.wait(timeout=max(0.0, deadline_s - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
+        end_all(entry.process for entry in self._entries if entry.process is not None)
 
 
 @contextlib.contextmanager

@@ -17,6 +17,7 @@ from rail_corridor.view.command import view
 
 from .figures import add_to as add_figures
 from .live import add_to as add_live
+from .others import add_to as add_others
 from .recordings import (
     NoWaveformsOption,
     RecordOption,
@@ -363,7 +364,13 @@ add_figures(app)
 
 
 def main() -> None:
-    """Entry point: every wrong input is one line and exit code 2."""
+    """Entry point of ``rail``."""
+    add_others(app)
+    run_application(app)
+
+
+def run_application(application: typer.Typer) -> None:
+    """Run commands: every wrong input is one line and exit code 2."""
     from rail_corridor.errors import InputError
     from rail_msgs_py.parameters import ParameterError
 
@@ -373,7 +380,7 @@ def main() -> None:
     )
 
     try:
-        code = app(standalone_mode=False)
+        code = application(standalone_mode=False)
     except (InputError, ParameterError, UsageError) as error:
         sys.exit(_refuse(str(error)))
     except usage_errors as error:

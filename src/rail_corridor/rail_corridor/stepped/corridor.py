@@ -42,7 +42,7 @@ from rail_corridor.scenario.model import Scenario
 from rail_msgs_py.delivery import LocalReader
 from rail_msgs_py.stamps import clock_from_cdr
 from rail_msgs_py.topics.qos import ESTIMATE
-from rail_msgs_py.topics.tick import CLOCK, FAILED, READY
+from rail_msgs_py.topics.tick import CLOCK, FAILED, READY, WAITING
 from rail_msgs_py.topics.topic import Topic
 
 from .site_processes import SiteProcesses
@@ -145,6 +145,8 @@ class SteppedCorridor:
         self.nodes: dict[str, Any] = {}
         #: Nodes that were killed; what was under way to one would find no handle if it were gone.
         self.dead: list[Any] = []
+        #: Full names of nodes that were ended and not started anew.
+        self.gone: set[str] = set()
         #: Spins all nodes of this process.
         # rclpy has crashes told on standard error, which a test may have replaced.
         with contextlib.redirect_stderr(sys.__stderr__):
@@ -215,19 +217,28 @@ class SteppedCorridor:
         reader = LocalReader(self.observer, refuse, take)
         self.delivery.line(FAILED.name()).readers.append(reader)
 
-    def ready_again(self, names: Iterable[str]) -> set[str]:
-        """Set that is filled with those of some nodes that say from now on that they are ready."""
+    def ready_again(self, names: Iterable[str], *, others_dead: bool = False) -> set[str]:
+        """Set that is filled with those of some nodes that say from now on that they are ready.
+
+        With ``others_dead`` also with those that say that they lack connections.
+        """
         heard: set[str] = set()
         wanted, begun = {*names}, False
 
-        def hear(message: Any) -> None:
-            if begun and message.data in wanted:
-                heard.add(message.data)
+        def hear(name: str) -> None:
+            if begun and name in wanted:
+                heard.add(name)
 
-        self.observer.listen(READY, hear)
+        self.observer.listen(READY, lambda message: hear(message.data))
+        if others_dead:
+            self.observer.listen(WAITING, lambda message: hear(message.name))
         self.spin(lambda: False, _SETTLE_S)  # what was said before is kept for late listeners
         begun = True
         return heard
+
+    def is_elsewhere(self, name: str) -> bool:
+        """Whether a node is in another process."""
+        return name not in self.nodes and (name in self._external or name in (self.sites or ()))
 
     def is_sink(self, name: str) -> bool:
         """Whether a tick ends only when a node of the plan is done."""

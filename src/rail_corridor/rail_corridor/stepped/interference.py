@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -50,7 +50,6 @@ class Interference:
 
     def __init__(self, corridor: SteppedCorridor) -> None:
         self._corridor = corridor
-        self._gone: set[str] = set()
 
     def kill(self, name: str) -> None:
         """Take a node out, as if its process had been killed; with it what shares the process.
@@ -73,8 +72,14 @@ class Interference:
             corridor.dead.append(node)
             killed, reason = [name], "killed"
         for each in killed:
-            self._gone.add(each)
-            corridor.call(partial(corridor.observer.announce_failure, each, reason))
+            self.announce_gone(each, reason)
+
+    def announce_gone(self, name: str, reason: str = "killed") -> None:
+        """Let everybody know of a node that has been ended."""
+        corridor = self._corridor
+        self._refuse_world(name)
+        corridor.gone.add(name)
+        corridor.call(partial(corridor.observer.announce_failure, name, reason))
 
     def restart(self, name: str, make: Callable[[], Any] | None = None) -> None:
         """Start a node anew, whether or not it is alive: it knows nothing of what was before.
@@ -94,24 +99,56 @@ class Interference:
         """
         corridor = self._corridor
         self._refuse_world(name)
-        if name not in self._gone:
+        if name not in corridor.gone:
             self.kill(name)
         if corridor.sites is not None and name in corridor.sites:
-            back = corridor.sites.beside(name)
-            said = corridor.ready_again(back)
-            corridor.sites.start(name)
-            if not corridor.spin(lambda: said >= {*back}, corridor.timeout_s):
-                lacking = ", ".join(sorted({*back} - said))
-                raise StalledError(f"{lacking}: not ready within {corridor.timeout_s:g} s")
-            # That it hears others it has said; when others hear it cannot be seen from here.
-            corridor.spin(lambda: False, _HEARD_S)
+            self.start_elsewhere(corridor.sites.beside(name), partial(corridor.sites.start, name))
+            return
+        if make is not None:
+            make()
         else:
-            back = [name]
-            if make is not None:
-                make()
-            else:
-                corridor.add_node(corridor.made(corridor.spec(name)), name)
-        self._gone.difference_update(back)
+            corridor.add_node(corridor.made(corridor.spec(name)), name)
+        corridor.gone.discard(name)
+
+    def start_elsewhere(self, names: Sequence[str], start: Callable[[], None]) -> None:
+        """Start a process, and wait until its nodes are ready.
+
+        One that lacks nothing but connections while others are dead counts as ready: its peers are
+        among them.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Full names of the nodes in the process.
+        start : callable
+
+        Raises
+        ------
+        StalledError
+            If they are not ready in time.
+        """
+        corridor, back = self._corridor, {*names}
+        said = corridor.ready_again(back, others_dead=bool(corridor.gone - back))
+        start()
+        if not corridor.spin(lambda: said >= back, corridor.timeout_s):
+            lacking = ", ".join(sorted(back - said))
+            raise StalledError(f"{lacking}: not ready within {corridor.timeout_s:g} s")
+        # That it hears others it has said; when others hear it cannot be seen from here.
+        corridor.spin(lambda: False, _HEARD_S)
+        corridor.gone.difference_update(back)
+
+    def can_be_switched(self, name: str) -> bool:
+        """Whether a node is equipment that can be switched off and on."""
+        corridor = self._corridor
+        if not corridor.is_elsewhere(name):
+            return hasattr(corridor.node(name), "switch_on")
+        service = f"{name}/change_state"
+
+        def offered() -> bool:
+            found = corridor.observer.get_service_names_and_types()
+            return any(each == service for each, _ in found)
+
+        return corridor.spin(offered, _HEARD_S)
 
     def switch(self, name: str, *, on: bool) -> None:
         """Switch equipment on or off.
@@ -124,7 +161,7 @@ class Interference:
             If one in another process does not answer.
         """
         corridor = self._corridor
-        if corridor.sites is not None and name in corridor.sites:
+        if corridor.is_elsewhere(name):
             self._switch_elsewhere(name, on=on)
             return
         node = corridor.node(name)

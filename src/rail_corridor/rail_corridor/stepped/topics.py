@@ -76,6 +76,11 @@ class RowView:
         self._columns, self._values = columns, values
 
     @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return self._columns
+
+    @property
     def stamp_s(self) -> float:
         """Simulated time [s]."""
         return self.stamp_ns * 1e-9
@@ -102,6 +107,7 @@ class TableView:
     def __init__(self, table: Table) -> None:
         self._table = table
         self.stamp_ns = table.stamp_ns
+        self.columns = table.columns
 
     @property
     def stamp_s(self) -> float:
@@ -190,6 +196,11 @@ class TopicHistory:
         """Number of messages so far."""
         self._looked_at[self.name] = None
         return len(self.sent)
+
+    def newest(self, count: int) -> list[Any]:
+        """Views of the newest messages, the newest last; fewer if there are not so many."""
+        self._looked_at[self.name] = None
+        return [view_of(self._topic, self._kind, message) for message in self.sent[-count:]]
 
     @property
     def latest(self) -> Any:

@@ -1,0 +1,1 @@
+"""Automatic train protection by movement authorities."""

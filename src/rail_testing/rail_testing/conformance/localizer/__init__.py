@@ -1,0 +1,1 @@
+"""The localizer: one position on board from all sensors."""

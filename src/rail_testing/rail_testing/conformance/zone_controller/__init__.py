@@ -1,0 +1,1 @@
+"""The zone controller: positions and movement authorities."""

@@ -89,9 +89,13 @@ def node() -> Recorder:
     return Recorder()
 
 
+def row(occupied: float) -> list[float]:
+    return [occupied, *[0.0] * (len(OCCUPANCY.columns) - 1)]
+
+
 def occupancy(circuit: str, tick: int, occupied: float = 0.0) -> bytes:
     writer = TableWriter((circuit,), OCCUPANCY.columns)
-    return writer.write(tick * TICK_NS, np.array([[occupied, 0.0]]))
+    return writer.write(tick * TICK_NS, np.array([row(occupied)]))
 
 
 def clock(tick: int) -> bytes:
@@ -117,9 +121,7 @@ def test_a_step_runs_once_a_tick_whatever_the_order_of_arrival() -> None:
             assert node.ticks == [], count
             name, raw = arrivals[index]
             node.feed[name](raw)
-        assert node.ticks == [
-            (0, {"/clock": None, ports["tc1"]: [1.0, 0.0], ports["tc2"]: [0.0, 0.0]})
-        ]
+        assert node.ticks == [(0, {"/clock": None, ports["tc1"]: row(1.0), ports["tc2"]: row(0.0)})]
         # Sums over the items are repeatable: they come in the order of the names.
         assert list(node.ticks[0][1]) == sorted(node.ticks[0][1])
 
@@ -133,7 +135,7 @@ def test_a_delayed_port_gives_what_was_sent_a_tick_before(node: Recorder) -> Non
     node.feed["/clock"](clock(1))
     assert [[items[port] for port in ports.values()] for _, items in node.ticks] == [
         [None, None],
-        [[1.0, 0.0], [1.0, 0.0]],
+        [row(1.0), row(1.0)],
     ]
 
 
@@ -159,7 +161,7 @@ def test_the_owner_of_an_overdue_port_is_named_and_its_item_missing(node: Record
     assert node.ticks == []
     node.wait(0.1)
     assert [name for name, _ in node.failed] == ["/wayside/tc2/track_code"]
-    assert node.ticks == [(0, {"/clock": None, ports["tc1"]: [0.0, 0.0]})]
+    assert node.ticks == [(0, {"/clock": None, ports["tc1"]: row(0.0)})]
     # The next tick does not wait for it, until it is there again.
     node.feed[ports["tc1"]](occupancy("tc1", 1))
     node.feed["/clock"](clock(1))

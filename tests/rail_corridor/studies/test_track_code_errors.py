@@ -22,7 +22,7 @@ from rail_signals.track_code.study.closed_forms import message_error_rate
 from rail_signals.track_code.study.error_count import ErrorCount
 from rail_signals.track_code.study.receivers import COUNTERS, Receiver
 
-STUDIES = sorted(path.stem for path in FOLDER.glob("track_code_*.yaml"))
+STUDIES = sorted({path.stem for path in FOLDER.glob("track_code_*.yaml")} - {"track_code_runs"})
 
 
 def count(seed: int = 1, **parameters: Any) -> dict[str, float | None]:

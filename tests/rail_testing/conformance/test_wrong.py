@@ -71,8 +71,11 @@ def test_a_wrong_one_is_caught(
 def test_wrong_use_is_one_line() -> None:
     for words, line in (
         (["atq"], "KIND: 'atq': must be one of atp"),
-        (["atp", "--command", "no_such_program_"], "no_such_program_: there is no such program"),
-        (["atp", "--list", "-k", "no_such_test"], "-k: no_such_test: selects no test"),
+        (
+            ["atp", "--command", "no_such_program_"],
+            "--command: 'no_such_program_': there is no such program",
+        ),
+        (["atp", "--list", "-k", "no_such_test"], "-k: 'no_such_test': selects no test"),
     ):
         done = subprocess.run(
             [sys.executable, "-m", "rail_testing.conformance", *words],
@@ -81,4 +84,4 @@ def test_wrong_use_is_one_line() -> None:
             timeout=120,
         )
         assert done.returncode == 2
-        assert line in done.stderr.replace("'", "'") and len(done.stderr.splitlines()) == 1
+        assert line in done.stderr and len(done.stderr.splitlines()) == 1

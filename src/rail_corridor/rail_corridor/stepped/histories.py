@@ -127,7 +127,7 @@ class Histories:
     @staticmethod
     def _owner(name: str) -> str:
         topic = kind_of(name)
-        return "" if topic is None else topic.owner(**topic.parts(name))
+        return "" if topic is None else name.rsplit("/", topic.below_owner)[0]
 
     @property
     def kept(self) -> dict[str, TopicHistory]:

@@ -55,7 +55,7 @@ OCCUPANCY: Final = Topic(
     ESTIMATE,
     Table,
     "track_code_transmitter",
-    "the track_code_transmitters behind and ahead",
+    "the track_code_transmitters behind and ahead, the report",
     "Whether the circuit is occupied: clear only where its own code is recognised at its level, "
     "and no train that came in sequence is missing.",
     table=(

@@ -8,7 +8,7 @@ with more a signal that cannot be read. What is sent in a tick arrives in the ne
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf, nan
 
 import numpy as np
@@ -54,7 +54,6 @@ class PureTrain:
     wheels: Wheels
     speed_mps: float = 0.0
     run_m: float = 0.0
-    restarts: int = 0
     protection: TrainProtection | None = None
     command: SupervisionOutput = _HELD
     frames: list[bytes] = field(default_factory=list)
@@ -131,8 +130,8 @@ class PureCorridor:
             released_trains=tuple(n for n, _ in self.releases),
             released_at_s=tuple(at for _, at in self.releases),
             released_mps=(15.0 / 3.6,) * len(self.releases), seed=seed, tick_s=tick_s,
+            secrets=("00" * 16,) * len(numbers),
         )  # fmt: skip
-        self._controller_starts = 0
         self._start_controller()
         self.trains = []
         for number, start_m in zip(numbers, starts_m, strict=True):
@@ -189,17 +188,13 @@ class PureCorridor:
             train.protection, train.command = None, _HELD
             return
         if train.protection is None:
-            train.restarts += 1
-            train.protection = protection_of(train.parameters, train.restarts)
+            train.protection = protection_of(train.parameters)
         train.command = train.protection.tick(now_ns, *odometer, frames)
         if heard:
             up.append((number, train.protection.frame(now_ns)))
 
     def _start_controller(self) -> None:
-        # Nonces of its own at every start.
-        seed = self.seed + 1000 * self._controller_starts
-        self._controller_starts += 1
-        self.issuer = authority_issuer_of(replace(self._wayside, seed=seed))
+        self.issuer = authority_issuer_of(self._wayside)
         self.tracker = ZoneTracker(self._map, self._entry)
         self._controller_on = True
 

@@ -193,7 +193,7 @@ def test_who_could_not_stop_before_it_left_and_is_silent_has_left(
     for _ in range(12):
         corridor.step(speed_mps=speed_mps)
     assert corridor.block.trains == (1, 2)
-    for _ in range(11):
+    for _ in range(10):
         corridor.step(silent=(1,), speed_mps=speed_mps)
     assert corridor.block.trains == (1, 2)
     for _ in range(4):

@@ -51,7 +51,9 @@ class DopplerSubsystem(Subsystem):
             clocked=True,
         ),
         NodeKind(
-            "doppler_positioner", "rail_onboard.doppler.positioner_node:DopplerPositionerNode"
+            "doppler_positioner",
+            "rail_onboard.doppler.positioner_node:DopplerPositionerNode",
+            waits=True,
         ),
     )
     topics = topics.TOPICS

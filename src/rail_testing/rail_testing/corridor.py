@@ -336,6 +336,8 @@ class Corridor(AddingMixin, InterferingMixin):
             self._interference = Interference(self._session)
             self._under_test.enter(self._session, domain, self._said)
             self._histories = Histories(self._session)
+            for name in self._under_test.commands:
+                self._histories.expect(name)
             self._session.start()
             self._under_test.after_tick(self._session, self._killed)
         except BaseException:

@@ -98,6 +98,11 @@ class NodesUnderTest:
         return tuple(entry.replaces for entry in self._entries if entry.replaces)
 
     @property
+    def commands(self) -> tuple[str, ...]:
+        """Full names of the nodes of the scenario whose place a process of the test takes."""
+        return tuple(e.replaces for e in self._entries if e.replaces and e.command is not None)
+
+    @property
     def awaited(self) -> tuple[str, ...]:
         """Full names of further nodes, in processes of their own, that end a tick."""
         beside = [each for each in self._entries if each.elsewhere and not each.replaces]

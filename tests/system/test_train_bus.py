@@ -49,7 +49,7 @@ def test_who_follows_a_train_that_parted_stays_behind_where_it_was_last_whole(
     data = {
         "name": "parted",
         "seed": 3,
-        "duration_s": 100.0,
+        "duration_s": 130.0,
         "tick_s": 0.5,
         "tracks": {
             "main": {
@@ -75,7 +75,7 @@ def test_who_follows_a_train_that_parted_stays_behind_where_it_was_last_whole(
         assert confirmed(reported) == 0.0
         length_m = c.scenario.trains[0].vehicle.length_m
         rear_m = c.truth("a").front_m - length_m
-        c.run_for(60.0)
+        c.run_for(90.0)
         assert c.truth("a").front_m > rear_m + 500.0
         assert c.truth("b").front_m < rear_m
         assert c.truth("b").speed_mps == 0.0

@@ -13,10 +13,11 @@ the only interval of a front that holds one is that train's.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from .association import FOLLOWED_S, RunningOrder, TrainCandidate, associate
+from .reading_places import ReadingPlace, ReadingPlaces
 from .zone_map import ZoneMap
 
 MAX_ACCELERATION_MPS2 = 2.0
@@ -85,48 +86,6 @@ class _TrackedTrain:
     unknown: str = field(default="not on the line yet")
 
 
-@dataclass(frozen=True)
-class _ReadingPlace:
-    zone: str
-    chainage_m: float
-    variance_m2: float
-
-
-class _Places:
-    """The readings of one tick; each is compared only with what is in its neighbourhood."""
-
-    def __init__(self, zone_map: ZoneMap, places: Sequence[_ReadingPlace]) -> None:
-        self._map, self.all = zone_map, places
-        self._in_zone: dict[str, list[int]] = {}
-        for number, place in enumerate(places):
-            self._in_zone.setdefault(place.zone, []).append(number)
-
-    def __getitem__(self, number: int) -> _ReadingPlace:
-        return self.all[number]
-
-    def of(self, zone: str) -> Sequence[int]:
-        """Numbers of the readings of a zone."""
-        return self._in_zone.get(zone, ())
-
-    def from_place(self, zone: str, chainage_m: float) -> Iterator[tuple[int, float]]:
-        """Number of, and signed distance along the line to, each reading in reach of a place."""
-        near = (number for to in self._map.in_reach_of(zone) for number in self.of(to))
-        for number in sorted(near):
-            there = self.all[number]
-            distance_m = self._map.path_distance_m(zone, chainage_m, there.zone, there.chainage_m)
-            assert distance_m is not None
-            yield number, distance_m
-
-    def distances_m(self) -> dict[tuple[int, int], float]:
-        """Signed distance along the line from one reading to another, of all that have one."""
-        return {
-            (number, other): distance_m
-            for number, place in enumerate(self.all)
-            for other, distance_m in self.from_place(place.zone, place.chainage_m)
-            if other != number
-        }
-
-
 class ZoneTracker:
     """Follows every train along the corridor.
 
@@ -177,7 +136,7 @@ class ZoneTracker:
         """
         if self.restarted is None:
             self.restarted = time_s > 0.0
-        located_in: list[_ReadingPlace] = []
+        located_in: list[ReadingPlace] = []
         disturbed: list[str] = []
         for name, reading in readings.items():
             if reading is NO_READING:
@@ -187,9 +146,9 @@ class ZoneTracker:
             elif math.isfinite(reading.range_m):
                 located = self._map.zones[name].locate(reading.range_m, reading.variance_m2)
                 if located is not None:
-                    located_in.append(_ReadingPlace(name, *located))
+                    located_in.append(ReadingPlace(name, *located))
         self.disturbed = tuple(disturbed)
-        places = _Places(self._map, located_in)
+        places = ReadingPlaces(self._map, located_in)
         distances_m = places.distances_m()
         owners = self._assign(time_s, places, distances_m, reported or {})
         owned = {*owners.values()}
@@ -210,7 +169,7 @@ class ZoneTracker:
     def _assign(
         self,
         time_s: float,
-        places: _Places,
+        places: ReadingPlaces,
         distances_m: Mapping[tuple[int, int], float],
         reported: Mapping[str, Reported],
     ) -> dict[int, int]:
@@ -234,7 +193,7 @@ class ZoneTracker:
                 candidates.append(TrainCandidate(index, False, here))
         return associate(candidates, distances_m, self._order)
 
-    def _in_interval(self, places: _Places, where: Reported | None) -> dict[int, float]:
+    def _in_interval(self, places: ReadingPlaces, where: Reported | None) -> dict[int, float]:
         """The places in a reported interval; they count alike."""
         if where is None:
             return {}
@@ -246,7 +205,9 @@ class ZoneTracker:
                 found[number] = 0.0
         return found
 
-    def _misses(self, train: _TrackedTrain, time_s: float, places: _Places) -> dict[int, float]:
+    def _misses(
+        self, train: _TrackedTrain, time_s: float, places: ReadingPlaces
+    ) -> dict[int, float]:
         """How far each place in reach is from where the train is expected, over what it may be."""
         elapsed_s = time_s - train.seen_s
         expected_m = train.speed_mps * elapsed_s
@@ -264,7 +225,7 @@ class ZoneTracker:
     def _learn_order(
         self,
         owners: Mapping[int, int],
-        places: _Places,
+        places: ReadingPlaces,
         distances_m: Mapping[tuple[int, int], float],
     ) -> None:
         """Take note of who is ahead of whom among the trains seen now."""
@@ -282,7 +243,7 @@ class ZoneTracker:
             if zones[places[here].zone].track != zones[places[there].zone].track:
                 self._order.learn(one, other, None)
 
-    def _follow(self, train: _TrackedTrain, time_s: float, place: _ReadingPlace) -> None:
+    def _follow(self, train: _TrackedTrain, time_s: float, place: ReadingPlace) -> None:
         """Step the train's filter on (chainage, speed) with a new place."""
         if not train.entered:
             train.entered = True
@@ -326,7 +287,7 @@ class ZoneTracker:
             train.p_vv,
         )
 
-    def _shared_zones(self, owners: Mapping[int, int], places: _Places) -> set[str]:
+    def _shared_zones(self, owners: Mapping[int, int], places: ReadingPlaces) -> set[str]:
         """Zones in which two trains were last seen, one of which is not received alone."""
         seen: dict[str, int] = {}
         for index, train in enumerate(self._trains):

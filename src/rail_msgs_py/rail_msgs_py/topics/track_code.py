@@ -66,14 +66,21 @@ OCCUPANCY: Final = Topic(
         Column(
             "level_db",
             "level of the circuit's own code at the receiving end, 0 dB being a wave of "
-            "amplitude 1; -300 or more",
+            "amplitude 1; -300 or more; NaN if the circuit is switched off",
         ),
         Column("detected", "1 if the receiver does not recognise its own code at its level"),
         Column(
             "holds",
-            "1 if a train came in from the circuit behind and has not been seen to go on",
+            "1 if a train came in from the circuit behind, or may have been there since this one "
+            "was switched on, and has not been seen to go on",
         ),
         Column("coherence", "part of the power in the band that is the circuit's own code, 0 to 1"),
+        Column("shunted", "1 if the level is so low that axles are the likely reason"),
+        Column(
+            "missing",
+            "1 if a train is held here or behind, and no receiver detects one from there to here",
+        ),
+        Column("found", "1 in the tick in which the train that is missing behind is found ahead"),
     ),
 )
 CODE_SENT: Final = Topic(

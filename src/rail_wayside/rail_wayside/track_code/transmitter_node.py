@@ -10,6 +10,7 @@ until its own code has been recognised for `PICK_UP_S`, and holds no train.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -37,6 +38,10 @@ from .sequence import CircuitState, SequenceHold
 
 #: Level that stands for none [dB].
 _NO_LEVEL_DB = -300.0
+#: What is said of a circuit that is switched off: occupied, and nothing else.
+_OFF = [1.0 if name in ("occupied", "detected") else 0.0 for name in OCCUPANCY.columns]
+_OFF[OCCUPANCY.index["level_db"]] = math.nan
+_FLAGS = ("occupied", "detected", "holds", "shunted", "missing", "found")
 
 
 @dataclass(frozen=True)
@@ -103,7 +108,7 @@ class TrackCodeTransmitterNode(
         p = self._p
         self._transmitter = FmTransmitter(self._profile, p.carrier_hz, p.sample_rate_hz)
         self._detector = TrackDetector(p.clear_level_db, p.carrier_hz, p.sample_rate_hz, p.tick_s)
-        self._hold = SequenceHold(p.tick_s, leaves=p.leaves)
+        self._hold = SequenceHold(p.tick_s, leaves=p.leaves, first=not p.behind)
         # Stamp and samples of the last block fed in; what was said of the neighbours then.
         self._sent: tuple[int, FloatArray] | None = None
         self._neighbours: tuple[CircuitState | None, Sequence[CircuitState | None]] = (
@@ -152,31 +157,32 @@ class TrackCodeTransmitterNode(
             behind=behind,
             ahead=ahead,
         )
-        occupied = state.occupied or not self.switched_on
         row = [
-            float(occupied),
+            float(state.occupied),
             max(detection.level_db, _NO_LEVEL_DB),
             float(state.detected),
             float(state.holds),
             detection.coherence,
+            float(state.shunted),
+            float(state.missing),
+            float(state.found),
         ]
+        if not self.switched_on:
+            row = _OFF
         self._sense(stamp_ns, np.array([row]))
         self.report(
             DiagnosticStatus.OK,
             "occupancy",
-            "occupied" if state.detected else "holds a train" if occupied else "clear",
+            "occupied" if state.detected else "holds a train" if state.holds else "clear",
             stamp_ns=stamp_ns,
         )
 
 
 def _state(row: Any) -> CircuitState | None:
-    """What a circuit said of itself; None if nothing was received."""
-    if row is None:
+    """What a circuit said of itself; None if nothing was received, or it is switched off."""
+    if row is None or np.isnan(row[OCCUPANCY.index["level_db"]]):
         return None
-    occupied, detected, holds = (
-        bool(row[OCCUPANCY.index[name]]) for name in ("occupied", "detected", "holds")
-    )
-    return CircuitState(occupied, detected, holds)
+    return CircuitState(**{name: bool(row[OCCUPANCY.index[name]]) for name in _FLAGS})
 
 
 if __name__ == "__main__":

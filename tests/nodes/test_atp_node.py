@@ -60,6 +60,7 @@ class Protection:
         self.controller = self.new_controller(given)
         self.frames: list[bytes] = []
         self.ticks = 0
+        self.run_m = self._speed_mps = 0.0
         self.localizer = given.get("localizer", False)
         if self.localizer:
             self.told = graph.mailbox(RELAYED_RANGE, train=TRAIN)
@@ -103,15 +104,16 @@ class Protection:
         self,
         frames: list[bytes] | None = None,
         *,
-        way_m: float = 0.0,
         speed_mps: float = 0.0,
         radio: bool = True,
         place: tuple[float, float] | None = None,
         slot: int = 1,
     ) -> dict[str, float]:
-        """Play a tick; return the command."""
+        """Play a tick in which the train gathers or loses speed; return the command."""
         count, now_ns = len(self.state), self.now_ns
-        self._odometer(self._wheels.write(now_ns, np.array([[way_m, speed_mps]])))
+        self.run_m += 0.5 * (self._speed_mps + speed_mps) * TICK_S
+        self._speed_mps = speed_mps
+        self._odometer(self._wheels.write(now_ns, np.array([[self.run_m, speed_mps]])))
         if radio:
             heard = tuple((slot, frame) for frame in frames or ())
             self._radio(Telegrams(now_ns, heard).to_msg())
@@ -165,20 +167,22 @@ def test_it_is_released_by_an_authority_and_reports_its_place(graph: Any, given:
     assert math.isnan(last(train.state)["end_of_authority_m"])
     train.hears()
     train.greet()
-    run = train.tick([train.authority(2000.0)], way_m=0.0)
+    run = train.tick([train.authority(2000.0)])
     assert run["service_brake"] == run["emergency_brake"] == 0.0
     assert 15.0 < run["permitted_mps"] <= 20.0
     state = last(train.state)
     assert state["end_of_authority_m"] == 2000.0
     # Half a tick on the way, and what clocks may have drifted.
     assert TICK_S / 2 < state["authority_age_s"] < TICK_S / 2 + 1e-3
-    train.tick([train.authority(2000.0)], way_m=10.0)
+    train.run_up(4.0, 2000.0)
+    train.tick([train.authority(2000.0)], speed_mps=4.0)
     report = train.hears()
     assert report is not None
     assert (report.train, report.direction, report.position_valid) == (1, 1, True)
     # Placed within a metre; the wheels err by 2 % at most.
-    assert report.offset_m == pytest.approx(START_M + 10.0, abs=0.01)
-    assert 1.2 <= report.uncertainty_m <= 1.3
+    assert train.run_m > 10.0
+    assert report.offset_m == pytest.approx(START_M + train.run_m, abs=0.01)
+    assert report.uncertainty_m == pytest.approx(1.0 + 0.02 * train.run_m, abs=0.11)
 
 
 def test_what_others_sealed_or_sealed_for_others_is_refused(graph: Any, given: Any) -> None:
@@ -231,10 +235,14 @@ def test_the_emergency_brake_acts_where_the_end_cannot_be_kept(graph: Any, given
     train.hears()
     train.greet()
     train.run_up(5.0, 1300.0)
-    assert train.tick([train.authority(1300.0)], way_m=20.0, speed_mps=5.0)["emergency_brake"] == 0
-    assert train.tick([train.authority(1300.0)], way_m=90.0, speed_mps=5.0)["emergency_brake"] == 1
-    passed = train.tick([train.authority(1300.0)], way_m=101.0, speed_mps=5.0)
-    assert (passed["permitted_mps"], passed["emergency_brake"]) == (0.0, 1.0)
+    braked_m = None
+    while train.run_m < 101.0:
+        command = train.tick([train.authority(1300.0)], speed_mps=5.0)
+        if command["emergency_brake"] and braked_m is None:
+            braked_m = train.run_m
+    # 5 m/s and 0.9 m/s^2 are 14 m, and what is gathered until the brake acts.
+    assert braked_m is not None and 30.0 < braked_m < 100.0 - 14.0
+    assert (command["permitted_mps"], command["emergency_brake"]) == (0.0, 1.0)
 
 
 def test_a_radio_that_is_silent_is_named_and_the_train_brakes(graph: Any, given: Any) -> None:
@@ -354,7 +362,7 @@ def test_an_emergency_stop_stops_a_train_with_track_ahead(graph: Any, given: Any
     train.run_up(5.0, 2000.0)
     run = train.tick([train.authority(2000.0)], speed_mps=5.0)
     assert run["emergency_brake"] == 0.0
-    stopped = train.tick([train.authority(2000.0, emergency_stop=True)], way_m=1.0, speed_mps=5.0)
+    stopped = train.tick([train.authority(2000.0, emergency_stop=True)], speed_mps=5.0)
     assert run["permitted_mps"] > 15.0 and stopped["permitted_mps"] <= 5.0
     assert (stopped["service_brake"], stopped["emergency_brake"]) == (1.0, 1.0)
 

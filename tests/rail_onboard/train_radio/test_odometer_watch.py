@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rail_onboard.train_radio.odometer_watch import OdometerWatch, RunningLimits
 from rail_onboard.train_radio.train_location import TrainLocation
@@ -19,12 +21,12 @@ LIMITS = RunningLimits(
 @pytest.mark.parametrize("tick_s", [0.1, 0.25, 0.5, 1.0])
 def test_what_brakes_and_motors_can_do_is_no_slide(tick_s: float) -> None:
     watch = OdometerWatch(0.02, LIMITS)
-    speed_mps, way_m = 0.0, 0.0
+    speed_mps = 0.0
     for change_mps2, until_mps in ((1.0, 20.0), (-1.3, 0.0)):
         while abs(speed_mps - until_mps) > 1e-6:
             step_mps = change_mps2 * tick_s
-            speed_mps = min(20.0, max(0.0, speed_mps + step_mps))
-            way_m = speed_mps * tick_s
+            before_mps, speed_mps = speed_mps, min(20.0, max(0.0, speed_mps + step_mps))
+            way_m = 0.5 * (before_mps + speed_mps) * tick_s
             watch.step(tick_s, way_m, speed_mps, False)
             assert not watch.doubted
 
@@ -88,3 +90,37 @@ def test_bad_limits_are_refused(name: str) -> None:
         RunningLimits(**{name: 0.0})
     with pytest.raises(ValueError, match="delay_s"):
         RunningLimits(delay_s=-1.0)
+
+
+@pytest.mark.parametrize(("before_mps", "ratio"), [(2.08, 0.402), (6.0, 0.7), (4.0, 1.3)])
+def test_a_slip_that_begins_within_a_long_tick_is_seen_by_the_way(
+    before_mps: float, ratio: float
+) -> None:
+    """The speeds alone could be those of a train that brakes, or gathers speed."""
+    limits = RunningLimits(accelerating_mps2=1.8, braking_mps2=2.5)
+    after_mps = before_mps + 0.3
+    assert -2.5 < ratio * after_mps - before_mps < 1.8
+    watch = OdometerWatch(0.02, limits)
+    watch.step(0.0, 0.0, before_mps, False)
+    watch.step(1.0, ratio * 0.5 * (before_mps + after_mps), ratio * after_mps, False)
+    assert watch.doubted
+
+
+@given(
+    st.floats(0.0, 25.0),
+    st.lists(st.floats(-2.5, 1.5), min_size=10, max_size=10),
+    st.floats(-0.02, 0.02),
+    st.sampled_from([0.1, 0.5, 1.0]),
+)
+def test_no_motion_within_the_limits_is_doubted(
+    speed_mps: float, accelerations: list[float], error: float, elapsed_s: float
+) -> None:
+    limits = RunningLimits(accelerating_mps2=1.5, braking_mps2=2.5)
+    watch = OdometerWatch(0.0205, limits)
+    watch.step(0.0, 0.0, (1.0 + error) * speed_mps, False)
+    dt_s, way_m = elapsed_s / len(accelerations), 0.0
+    for acceleration in accelerations:
+        after_mps = max(0.0, speed_mps + acceleration * dt_s)
+        way_m, speed_mps = way_m + 0.5 * (speed_mps + after_mps) * dt_s, after_mps
+    watch.step(elapsed_s, (1.0 + error) * way_m, (1.0 + error) * speed_mps, False)
+    assert not watch.doubted

@@ -7,7 +7,10 @@ e the error of the wheels and t the time from reading to reading,
     v' < v - (1 + e) b t - q    or    v' > v + (1 + e) a t + q
 
 is no motion of a train whose greatest deceleration is b and whose greatest acceleration is a; q is
-what readings are rounded by. From there on the odometer is **in doubt**, and the speed of the train
+what readings are rounded by. Neither is a way in that time that is shorter than that of a train
+which brakes with b and then gathers a, or longer than that of one which does it the other way
+round: so wheels that slide from within a long tick on are seen even where the speeds could be those
+of a train that brakes. From there on the odometer is **in doubt**, and the speed of the train
 is bounded by physics from the greater and the smaller of the two readings on:
 
 - it rises by a at most, or, once the brakes have been demanded for their dead time, falls by what
@@ -33,6 +36,8 @@ from rail_onboard.track_code.supervision import STANDSTILL_MPS
 
 #: By how much a reading of the speed may be rounded [m/s].
 _ROUNDING_MPS = 0.05
+#: By how much a way counted may be [m].
+_ROUNDING_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +73,38 @@ class RunningLimits:
                 raise ValueError(f"{name}: {getattr(self, name)} is not above zero")
         if not 0.0 <= self.delay_s < inf:
             raise ValueError(f"delay_s: {self.delay_s} is negative or not finite")
+
+
+def least_way_m(
+    elapsed_s: float,
+    before_mps: float,
+    after_mps: float,
+    *,
+    losing_mps2: float,
+    gaining_mps2: float,
+) -> float:
+    """Least way from one speed to another in a time: braking first, then gathering speed.
+
+    Between speeds that are not that near to each other, that of the mean speed.
+
+    Examples
+    --------
+    >>> round(least_way_m(2.0, 10.0, 10.0, losing_mps2=1.0, gaining_mps2=1.0), 6)
+    19.0
+    >>> least_way_m(10.0, 1.0, 2.0, losing_mps2=1.0, gaining_mps2=2.0)  # it stands in between
+    1.5
+    """
+    total = losing_mps2 + gaining_mps2
+    braking_s = (before_mps - after_mps + gaining_mps2 * elapsed_s) / total
+    if not 0.0 <= braking_s <= elapsed_s:
+        return 0.5 * (before_mps + after_mps) * elapsed_s
+    lowest_mps = before_mps - losing_mps2 * braking_s
+    if lowest_mps < 0.0:
+        return 0.5 * (before_mps**2 / losing_mps2 + after_mps**2 / gaining_mps2)
+    gathering_s = elapsed_s - braking_s
+    return (
+        0.5 * (before_mps + lowest_mps) * braking_s + 0.5 * (lowest_mps + after_mps) * gathering_s
+    )
 
 
 class OdometerWatch:
@@ -130,7 +167,9 @@ class OdometerWatch:
         if before_mps is None or self._limits is None or elapsed_s <= 0.0:
             return self._counted(counted_m)
         self._braked_s = self._braked_s + elapsed_s if braked else 0.0
-        if self._impossible(before_mps, speed_mps, elapsed_s):
+        if self._impossible(before_mps, speed_mps, elapsed_s) or not self._joins(
+            before_mps, speed_mps, counted_m, elapsed_s
+        ):
             self.stepped = before_mps, speed_mps
             self._widen(before_mps, speed_mps)
         if not self.unproven:
@@ -162,6 +201,31 @@ class OdometerWatch:
         lost_mps = self._limits.braking_mps2 * scaled_s + _ROUNDING_MPS
         gained_mps = self._limits.accelerating_mps2 * scaled_s + _ROUNDING_MPS
         return not before_mps - lost_mps <= speed_mps <= before_mps + gained_mps
+
+    def _joins(
+        self, before_mps: float, speed_mps: float, counted_m: float, elapsed_s: float
+    ) -> bool:
+        """Whether a train can have run a way in a time from one speed to another."""
+        assert self._limits is not None
+        most = 1.0 + self._error
+        loses, gains = most * self._limits.braking_mps2, most * self._limits.accelerating_mps2
+        slack_m = _ROUNDING_M + _ROUNDING_MPS * elapsed_s
+        least_m = least_way_m(
+            elapsed_s, before_mps, speed_mps, losing_mps2=loses, gaining_mps2=gains
+        )
+        if counted_m < least_m - slack_m:
+            return False
+        # Seen from one that runs ahead of it, the most is the least.
+        ahead_mps = max(before_mps, speed_mps) + gains * elapsed_s
+        behind_m = least_way_m(
+            elapsed_s,
+            ahead_mps - before_mps,
+            ahead_mps - speed_mps,
+            losing_mps2=gains,
+            gaining_mps2=loses,
+        )
+        most_m = ahead_mps * elapsed_s - behind_m
+        return counted_m <= most_m + slack_m
 
     def _widen(self, one_mps: float, other_mps: float) -> None:
         """Doubt the odometer: the train had one of two speeds, or one between."""

@@ -13,6 +13,7 @@ from .handover import HandoverParameters, draw_handover
 from .integrity import IntegrityParameters, count_integrity
 from .kills import KillParameters, draw_kill, look_at_kill
 from .link_margin.runs import LinkMarginParameters, draw_link_margin, look_at_link_margin
+from .localizer_pace import PaceParameters, compare_pace
 from .safety.judgement import judge_safety
 from .safety.scenario import SafetyParameters, draw_safety
 from .threats import ThreatParameters, count_threats
@@ -39,6 +40,7 @@ GENERATORS: Final[Mapping[str, GeneratorSource]] = {
 }
 CALCULATIONS: Final[Mapping[str, CalculationSource]] = {
     "integrity": CalculationSource(IntegrityParameters, count_integrity),
+    "localizer_pace": CalculationSource(PaceParameters, compare_pace),
     "threats": CalculationSource(ThreatParameters, count_threats),
     "track_code_errors": CalculationSource(TrackCodeErrorParameters, count_track_code_errors),
     "train_bus": CalculationSource(TrainBusParameters, examine_train_bus),

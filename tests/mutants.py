@@ -222,9 +222,13 @@ MUTANTS: list[Mutant] = [
         f"{EQUIPMENT}/track_code/report.py",
         f"{_REPORTS}/track_code/test_verdicts.py",
         ("wrong messages are 0", '"wrong": int(wrong)', '"wrong": 0'),
-        ("a word may be 80 s old", "OLDEST_S = 8.0", "OLDEST_S = 80.0"),
         ("occupied blocks entered are 0", "return entered", "return 0"),
         ("a rear at the border is inside", "rear_m < ends_m", "rear_m <= ends_m"),
+    ),
+    *_group(
+        f"{EQUIPMENT}/track_code/claims.py",
+        f"{_REPORTS}/track_code/test_verdicts.py",
+        ("a word may be 80 s old", "OLDEST_S: Final = 8.0", "OLDEST_S: Final = 80.0"),
     ),
     *_group(
         f"{EQUIPMENT}/train_radio/report.py",
@@ -507,17 +511,29 @@ MUTANTS: list[Mutant] = [
         "rail_onboard/train_radio/test_supervision.py"
         " ::test_the_permitted_speed_leaves_just_the_way_to_stop_before_the_end"
         " ::test_a_fall_and_the_error_of_the_speed_count_at_both_ends",
-        ("motors stop at once", "return self.traction_mps2 + GRAVITY", "return GRAVITY"),
+        (
+            "motors stop at once",
+            "self.traction_mps2 * pull_s + fall_mps2 * wait_s\n",
+            "fall_mps2 * wait_s\n",
+        ),
         (
             "no fall takes from the brake",
-            "(self.emergency_mps2, -self.fall_permil)",
-            "(self.emergency_mps2, 0.0)",
+            "[-self.gradients.steepest_fall_permil], 0.0)",
+            "[0.0], 0.0)",
         ),
         (
             "the speed is exact",
-            "v = self.gathering_mps2, self.delay_s, (1.0 + self.speed_error) *",
-            "v = self.gathering_mps2, self.delay_s, 1.0 *",
+            "true_mps = (1.0 + self.speed_error) *",
+            "true_mps = 1.0 *",
         ),
+    ),
+    *_group(
+        f"{ONBOARD}/train_radio/authority_curves.py",
+        "rail_onboard/train_radio/test_supervision.py"
+        " rail_onboard/train_radio/test_braking_safety.py",
+        ("no margin before the end", "min(rolling_m - self._margin_m, overlap_m)", "rolling_m"),
+        ("the front is where it is believed", "s + location.uncertainty_m, s -", "s, s -"),
+        ("the rear leaves a limit at once", "if to_m > place.rear_m:", "if to_m > place.front_m:"),
     ),
     *_group(
         f"{ONBOARD}/train_radio/supervision.py",
@@ -527,14 +543,11 @@ MUTANTS: list[Mutant] = [
         " ::test_the_emergency_curve_to_the_end_itself"
         " ::test_old_and_future_authorities_and_those_out_of_order_are_ignored"
         " ::test_a_train_that_does_not_know_where_it_is_stops",
-        ("no margin before the end", "left_m = ahead_m - self._margin_m", "left_m = ahead_m"),
-        ("the front is where it is believed", "s + location.uncertainty_m, s", "s, s"),
         (
             "an authority may be ten times as old",
             "authority.sealed_s > oldest_s",
             "authority.sealed_s > 10.0 * oldest_s",
         ),
-        ("the end may be passed", "if ahead_m < 0.0:", "if ahead_m < -1e9:"),
         ("old authorities are obeyed", "authority.sealed_s > self._authority.sealed_s", "True"),
         ("without a place a train goes on", 'return "" if located else', 'return "" if True else'),
     ),
@@ -683,13 +696,30 @@ MUTANTS: list[Mutant] = [
     ),
     *_group(
         f"{ONBOARD}/localizer/protected_interval.py",
-        "nodes/test_track_code_nodes.py"
-        "::test_supervision_judges_the_fastest_that_a_localizer_allows",
-        (
-            "a train is as fast as at least",
-            "max(abs(slowest_mps), abs(fastest_mps))",
-            "min(abs(slowest_mps), abs(fastest_mps))",
-        ),
+        "rail_onboard/localizer/test_protected_interval.py",
+        ("doubted wheels are believed", "if self.wheels_doubted:", "if False:"),
+    ),
+    # Restarts, slides, circuits that lie.
+    *_group(
+        f"{ONBOARD}/train_radio/train_protection.py",
+        "nodes/test_atp_node.py::test_switched_off_it_brakes_and_on_again_it_knows_nothing",
+        ("who restarts stands where it started", "if time_ns == 0:", "if True:"),
+    ),
+    *_group(
+        f"{ONBOARD}/train_radio/odometer_watch.py",
+        "rail_onboard/train_radio/test_odometer_watch.py",
+        ("a way may be as short as it likes", "if counted_m < least_m - slack_m:", "if False:"),
+    ),
+    *_group(
+        "rail_wayside/rail_wayside/train_radio/authority_issuer.py",
+        "rail_corridor/equipment/train_radio/test_faults_and_liveness.py"
+        "::test_a_controller_restarted_gives_nothing_until_old_authorities_are_over_and_trains_stand",
+        ("a restarted controller knows its trains", "if time_s > 0.0:", "if False:"),
+    ),
+    *_group(
+        "rail_wayside/rail_wayside/track_code/detector.py",
+        "rail_wayside/track_code/test_detector.py",
+        ("noise clears a circuit", "LEAST_COHERENCE: Final = 0.6", "LEAST_COHERENCE: Final = 0.0"),
     ),
 ]
 

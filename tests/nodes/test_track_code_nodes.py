@@ -214,12 +214,20 @@ def test_supervision_judges_the_fastest_that_a_localizer_allows(graph: Any) -> N
     codes, wheels, places = (TableWriter(("train_1",), names) for names in columns)
     values = dict.fromkeys(CODE_RECEIVED.columns, 0.0) | {"carrier_hz": 1700.0, "valid": 1.0}
     values |= FIELDS
-    heard = np.array([[values[name] for name in CODE_RECEIVED.columns]], dtype=float)
 
-    def tick(number: int, believed_mps: float, fastest_mps: float) -> dict[str, float]:
+    def tick(
+        number: int,
+        believed_mps: float,
+        fastest_mps: float,
+        *,
+        doubted: bool = True,
+        carrier_hz: float = 1700.0,
+    ) -> dict[str, float]:
+        told = values | {"carrier_hz": carrier_hz}
+        heard = np.array([[told[name] for name in CODE_RECEIVED.columns]], dtype=float)
         place = dict.fromkeys(LOCALIZER_STATE.columns, 0.0)
         place |= {"low_m": -1.0, "high_m": 1.0, "speed_mps": believed_mps}
-        place |= {"fastest_mps": fastest_mps, "wheels_doubted": 1.0}
+        place |= {"fastest_mps": fastest_mps, "wheels_doubted": float(doubted)}
         code(codes.write(number * TICK_NS, heard))
         odometer(wheels.write(number * TICK_NS, np.array([[0.0, 0.0]])))  # they stand still
         row = np.array([[place[name] for name in LOCALIZER_STATE.columns]])
@@ -232,7 +240,12 @@ def test_supervision_judges_the_fastest_that_a_localizer_allows(graph: Any) -> N
     assert slow["service_brake"] == 0.0
     # The driver is shown less by what he may be faster than he believes.
     assert slow["permitted_mps"] == pytest.approx(permitted_mps - 0.5)
-    assert tick(1, 19.0, 26.0)["emergency_brake"] == 1.0
+    # The doubt of wheels that are believed is made up for in the braking distance.
+    entered = [tick(n, 0.0, 0.0, doubted=False, carrier_hz=2300.0) for n in range(1, 5)][-1]
+    assert entered["permitted_mps"] > permitted_mps + 1.0
+    creeps = tick(5, 0.0, 25.0, doubted=False, carrier_hz=2300.0)
+    assert creeps["permitted_mps"] < entered["permitted_mps"] - 1.0
+    assert tick(6, 19.0, 26.0, carrier_hz=2300.0)["emergency_brake"] == 1.0
 
 
 def to_ns_of(message: Any) -> int:

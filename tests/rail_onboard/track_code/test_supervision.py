@@ -186,6 +186,35 @@ def test_a_localizer_counts_where_it_knows_both_places() -> None:
     assert permitted(lambda at_m: at_m < 50.0) == permitted(lambda at_m: at_m > 50.0) == blind
 
 
+@pytest.mark.parametrize("doubt_mps", [0.0, 1.0, 4.0])
+def test_a_train_that_is_faster_than_its_wheels_say_still_stops_in_its_block(
+    doubt_mps: float,
+) -> None:
+    """At the worst by physics: the doubt stays until it stands, it gathers until brakes act."""
+    b, t, a = 0.5, DELAYS.brake_s, DELAYS.traction_mps2
+    fields, left_m = code(80.0, 0.0, 500.0), 500.0  # `entered` is at the entrance at the worst
+    used_m = 0.0
+    for speed_mps in [0.1 * step for step in range(10, 220)]:
+        ride = entered(fields, speed_mps, odometer_error=0.0)
+        out = ride.supervision.update(
+            ride.time_s + TICK_S,
+            ride.at_m,
+            speed_mps,
+            fields=fields,
+            carrier_hz=2300.0,
+            fastest_mps=speed_mps,
+            doubt_mps=doubt_mps,
+        )
+        if out.service_brake:
+            break
+        fastest = speed_mps + doubt_mps + a * t
+        needed_m = (fastest - 0.5 * a * t) * t + fastest**2 / (2.0 * b)
+        assert needed_m < left_m
+        used_m = needed_m
+    # And it is let run nearly as far as that.
+    assert used_m > 0.9 * left_m
+
+
 def test_crosstalk_makes_no_entrance() -> None:
     """A change before the coded end, and back, leaves the train at the worst place."""
     fields = code(160.0, 40.0, 1500.0)

@@ -50,7 +50,8 @@ class Row:
 
     def tick(self, dead: Iterable[int] = (), off: Iterable[int] = ()) -> list[bool]:
         """One tick; returns which circuits are occupied."""
-        before, states = self.states, []
+        before = self.states
+        states: list[CircuitState | None] = []
         for index in range(self.count):
             if index in off:
                 self.was_off.add(index)

@@ -63,11 +63,18 @@ class LocatedFront:
             That the brake is good for, and the time until it acts.
         """
         doubt_mps = max(0.0, self.most_mps - supervised_mps)
-        return doubt_mps * (delay_s + (supervised_mps + 0.5 * doubt_mps) / deceleration_mps2)
+        return doubt_way_m(doubt_mps, supervised_mps, deceleration_mps2, delay_s)
 
     def travelled(self, direction: int) -> tuple[float, float]:
         """Least and most of the chainage that grows with the travel [m]; `direction` 1 or -1."""
         return (self.low_m, self.high_m) if direction > 0 else (-self.high_m, -self.low_m)
+
+
+def doubt_way_m(
+    doubt_mps: float, supervised_mps: float, deceleration_mps2: float, delay_s: float
+) -> float:
+    """The way d (T + (v + d / 2) / b) that a train needs more which may run d faster than v [m]."""
+    return doubt_mps * (delay_s + (supervised_mps + 0.5 * doubt_mps) / deceleration_mps2)
 
 
 def protected_interval(row: Sequence[float] | None) -> LocatedFront | None:

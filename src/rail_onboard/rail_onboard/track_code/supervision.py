@@ -27,6 +27,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, sqrt
 
+from rail_onboard.localizer.protected_interval import doubt_way_m
 from rail_signals.track_code.scales import (
     GRAVITY_MPS2,
     IDENTITIES,
@@ -166,6 +167,7 @@ class CodeSupervision:
         carrier_hz: float | None = None,
         located_m: tuple[float, float] | None = None,
         fastest_mps: float | None = None,
+        doubt_mps: float = 0.0,
     ) -> SupervisionOutput:
         """One tick.
 
@@ -185,6 +187,9 @@ class CodeSupervision:
         fastest_mps : float, optional
             The fastest that the train may run, by a localizer; `speed_mps` is then the speed that
             is believed, and only tells whether it stands.
+        doubt_mps : float
+            By how much the train may run faster than what is compared with limits; made up for in
+            the braking distance.
         """
         if time_s < self._time_s:
             self.reset()
@@ -202,7 +207,7 @@ class CodeSupervision:
             if self._can_be_of_this_circuit(identity, stands=fastest <= STANDSTILL_MPS):
                 self._take(time_s, self._scales.read(fields), identity)
         lost = self._overdue(time_s)
-        permitted_mps = self._permitted_mps(place)
+        permitted_mps = self._permitted_mps(place, fastest, doubt_mps)
         if not lost:
             self._lost = None
         else:
@@ -310,7 +315,7 @@ class CodeSupervision:
         run_m = place.run_m(self._entry, self._odometer_error)
         return max(0.0, self._code.length_m - run_m)
 
-    def _permitted_mps(self, place: _OdometerPlace) -> float:
+    def _permitted_mps(self, place: _OdometerPlace, speed_mps: float, doubt_mps: float) -> float:
         """Speed permitted by the code at a place of its block; no bound if there was none."""
         code = self._code
         if code is None:
@@ -322,7 +327,8 @@ class CodeSupervision:
             return code.end_mps
         t = self._delays.brake_s
         a = self._delays.traction_mps2 + max(0.0, -GRAVITY_MPS2 * 1e-3 * code.gradient_permil)
-        left_m = self._left_m(place)
+        more_m = doubt_way_m(doubt_mps, speed_mps + a * t, b, t)
+        left_m = max(0.0, self._left_m(place) - more_m)
         w = -b * t + sqrt((b * t) ** 2 + code.end_mps**2 + 2.0 * b * left_m + a * b * t**2)
         curve_mps = w - a * t - self._thresholds.service_over_mps
         return min(code.now_mps, max(code.end_mps, curve_mps))

@@ -89,12 +89,13 @@ class CodeSupervisionNode(
             if code[CODE_RECEIVED.index["valid"]] > 0.0:
                 fields = {name: round(code[CODE_RECEIVED.index[name]]) for name in _FIELDS}
         distance_m, speed_mps = items[self._odometer]
-        travelled_m, fastest_mps, doubt_mps = None, None, 0.0
+        travelled_m, fastest_mps, doubt_mps, more_mps = None, None, 0.0, 0.0
         known = protected_interval(items.get(self._localizer))
         if known is not None:
             travelled_m = known.travelled(self._p.direction)
             speed_mps, fastest_mps = known.speeds(speed_mps)
             doubt_mps = fastest_mps - speed_mps
+            more_mps = max(0.0, known.most_mps - fastest_mps)
         output = self._supervision.update(
             stamp_ns * 1e-9,
             distance_m,
@@ -103,6 +104,7 @@ class CodeSupervisionNode(
             carrier_hz=carrier_hz,
             located_m=travelled_m,
             fastest_mps=fastest_mps,
+            doubt_mps=more_mps,
         )
         emergency = output.emergency_brake or not self.switched_on
         values = [

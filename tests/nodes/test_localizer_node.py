@@ -220,7 +220,7 @@ def test_a_relayed_range_enters_with_its_age_and_its_sigma(graph: Any) -> None:
         if received is not None:
             measured_s, range_m = received
             age_s = time_s - measured_s
-            ranging = RangeFix(range_m, 0.25, age_s, float(range_m >= 1001.0))
+            ranging = RangeFix(range_m, 0.25, age_s, float(range_m >= 1001.0), lasting_m=0.5)
         here = Localization.of(
             alone.tick(time_s, TickMeasurements(ranging, odometer=WheelSpeed(0.0, 0.0)))
         )

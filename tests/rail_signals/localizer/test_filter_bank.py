@@ -26,11 +26,13 @@ from rail_signals.localizer.filter_bank import (
     singer,
 )
 from rail_signals.localizer.filter_kernel import predict_filters, take_scalar
+from rail_signals.localizer.localizer import Localizer
 from rail_signals.localizer.readings import (
     BlockEntry,
     DopplerFix,
     MeasurementModel,
     RangeFix,
+    TickMeasurements,
     WheelSpeed,
 )
 from rail_signals.localizer.settings import (
@@ -371,3 +373,19 @@ def test_one_train_is_one_of_many_runs() -> None:
             np.testing.assert_allclose(bank.x, many.x[:, 0], rtol=1e-9, atol=1e-9)
             np.testing.assert_allclose(bank.p, many.p[:, :, 0], rtol=1e-9, atol=1e-9)
             np.testing.assert_array_equal(bank.p, bank.p.swapaxes(0, 1))
+
+
+def test_what_lasts_in_ranges_is_not_averaged_away() -> None:
+    """A clock that is wrong shifts all ranges alike: the claim holds a shift of 4 of its sigmas."""
+    rng = np.random.default_rng(5)
+    localizer = Localizer(LocalizerSettings())
+    lasting_m, start_m, speed_mps = 1.5, 1000.0, 11.0
+    for tick in range(400):
+        true_m = start_m + speed_mps * 0.1 * tick
+        told_m = true_m + 4.0 * lasting_m + lasting_m * rng.standard_normal()
+        readings = TickMeasurements(
+            range=RangeFix(told_m, lasting_m**2, 0.0, lasting_m=lasting_m),
+            odometer=WheelSpeed(speed_mps + 0.02 * rng.standard_normal(), 0.0),
+        )
+        here = localizer.tick(0.1 * tick, readings)
+        assert here.low_m <= true_m <= here.high_m, tick

@@ -204,17 +204,19 @@ class LocalizerNode(EquipmentNode[LocalizerParameters], name="localizer", namesp
             if isnan(time_s) and isnan(position_m):
                 return None
             age_s = stamp_ns / NANOSECONDS - time_s
+            # What is told has in it how wrong its time may be, and clocks are so for long.
+            lasting_m = abs(half_m) / self._p.told_sigmas
             # The square must not hide a sign that is wrong.
             variance_m2 = copysign((half_m / self._p.told_sigmas) ** 2, half_m)
         elif shared is not None:
             position_m, variance_m2, _, _ = shared
             if variance_m2 == inf:
                 return None
-            age_s = 0.0
+            age_s = lasting_m = 0.0
         else:
             return None
         station = bisect_right(self._p.zone_starts_m, position_m)
-        return RangeFix(position_m, variance_m2, age_s, float(station))
+        return RangeFix(position_m, variance_m2, age_s, float(station), lasting_m=lasting_m)
 
     def _block_of(self, code: list[float] | None) -> BlockEntry | None:
         if code is None:

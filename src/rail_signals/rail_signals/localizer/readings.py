@@ -38,7 +38,8 @@ class RangeFix(NamedTuple):
     ``station`` is any number that tells apart the stations that measured. Here as in the other
     readings every value is a float, or float64 [..., 1] for many runs; ``present`` is where there
     is a reading: elsewhere the others are not looked at, but must be finite, variances above zero.
-    The age is the time since the reading was true.
+    The age is the time since the reading was true. ``lasting_m`` is the sigma of what is the same
+    from reading to reading beyond what is assumed of any range, as where its time is wrong.
     """
 
     chainage_m: Values
@@ -46,6 +47,7 @@ class RangeFix(NamedTuple):
     age_s: Values
     station: Values = 0.0
     present: bool | BoolArray = True
+    lasting_m: Values = 0.0
 
 
 class DopplerFix(NamedTuple):
@@ -100,7 +102,11 @@ class MeasurementModel:
         bank.start(reading.chainage_m, use)
         noise = np.maximum(reading.variance_m2, model.least_sigma_m**2)
         row, slack = self._place_row(reading.age_s)
-        row.append((RANGE_BIAS, None))
+        if _is_zero(reading.lasting_m) or model.bias_m == 0.0:
+            noise = noise + np.square(reading.lasting_m)
+            row.append((RANGE_BIAS, None))
+        else:
+            row.append((RANGE_BIAS, np.hypot(model.bias_m, reading.lasting_m) / model.bias_m))
         return (bank.take(row, reading.chainage_m, noise + slack, use),)
 
     def doppler(self, bank: FilterBank, reading: DopplerFix, use: BoolArray) -> Outcomes:

@@ -68,6 +68,7 @@ class _Content(NamedTuple):
     variance_m2: Values = 1.0
     covariance_m2ps: Values = 0.0
     speed_variance_m2ps2: Values = 1.0
+    lasting_m: Values = 0.0
     label: Values = 0.0
 
 
@@ -124,7 +125,13 @@ class ReadingScreen:
                     Sensor.RANGE,
                     time_s,
                     ranging,
-                    _Content(ranging.chainage_m, 0.0, ranging.variance_m2, label=ranging.station),
+                    _Content(
+                        ranging.chainage_m,
+                        0.0,
+                        ranging.variance_m2,
+                        lasting_m=ranging.lasting_m,
+                        label=ranging.station,
+                    ),
                 ),
                 doppler and self._evidence(Sensor.DOPPLER, time_s, doppler, _Content(*doppler[:5])),
                 block and self._evidence(Sensor.BLOCK, time_s, block, _Content(block.joint_m, 0.0)),
@@ -189,13 +196,16 @@ class ReadingScreen:
         NaN compares with nothing, so every check is one that it fails. The time since the last
         reading is NaN before there is one, and passes.
         """
-        s, v, var_s, covariance, var_v, label = content
-        finite = 0.0 * (age_s + s + v + var_s + covariance + var_v + label) == 0.0
+        s, v, var_s, covariance, var_v, lasting, label = content
+        finite = 0.0 * (age_s + s + v + var_s + covariance + var_v + lasting + label) == 0.0
         return (
             (Rejection.NOT_FINITE, finite),
             (
                 Rejection.IMPLAUSIBLE,
-                _within(s, MOST_M) & _within(v, MOST_MPS) & _within(var_s, MOST_M**2),
+                _within(s, MOST_M)
+                & _within(v, MOST_MPS)
+                & _within(var_s, MOST_M**2)
+                & _within(lasting, MOST_M),
             ),
             (
                 Rejection.BAD_VARIANCE,

@@ -16,7 +16,7 @@ from rail_signals.train_radio.slots import RadioSlots
 from rail_world.trains.description import VehicleDescription
 
 from .keys import pair_keys
-from .nodes import CONTROLLER, burst_format, curves_of
+from .nodes import CONTROLLER, burst_format, curves_of, steepest_fall_permil
 from .placement import bases_of
 from .section import CBTC, CbtcPlan, ClockError, DeadBaseStation, NetworkThreats
 
@@ -108,14 +108,19 @@ def _check_brakes(plan: CbtcPlan, vehicle: VehicleDescription, field: str) -> No
 
 def _check_protection(scenario: Scenario, plan: CbtcPlan, number: int, field: str) -> None:
     """Refuse a gradient that leaves too little of a brake, and a buffer too near to stop at."""
+    train = scenario.trains[number - 1]
+    track = scenario.network.tracks[train.route[0]]
     try:
         curves = curves_of(scenario, plan, number)
     except ValueError as error:
+        fall_permil = steepest_fall_permil(track)
+        if "too little" not in str(error):
+            raise InputError(str(error), field=field, value=train.name) from None
         raise InputError(
-            f"does not go with its track: {error}", field=field, value=number
+            f"does not stop a train on the fall of {fall_permil:g} per mille of {train.route[0]}",
+            field="cbtc.braking_mps2",
+            value=plan.braking_mps2,
         ) from None
-    train = scenario.trains[number - 1]
-    track = scenario.network.tracks[train.route[0]]
     if train.leaves_on_arrival:
         return
     end = ReceivedAuthority(0.0, track.length_m, FASTEST_MPS, overlap_m=plan.buffer_m, release=True)

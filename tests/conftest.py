@@ -68,24 +68,28 @@ def module_domain() -> Iterator[int]:
 
 
 _SECOND_GROUP = {
-    *("test_corridor", "test_plugin", "test_positions_on_board", "test_train_radio"),
-    *("test_placement", "test_axle_counter", "test_two_hosts", "test_failures", "test_examples"),
-    *("test_losslessness", "test_listeners", "test_recordings", "test_study"),
+    *("test_corridor", "test_plugin", "test_axle_counter", "test_two_hosts", "test_examples"),
+    *("test_placement", "test_failures", "test_losslessness", "test_listeners", "test_recordings"),
 }
+_THIRD_GROUP = {"test_positions_on_board", "test_train_radio", "test_study", "test_wrong"}
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Put system tests into two groups, one after the other within each: they start processes.
+    """Put system tests into groups, one after the other within each: they start processes.
 
-    Those that look at the wall clock are in the first; the second waits for what a run does.
+    Those that look at the wall clock are in the first; the others wait for what a run does.
     """
     if item.get_closest_marker("system"):
-        second = item.path.stem in _SECOND_GROUP
-        item.add_marker(pytest.mark.xdist_group("system_runs" if second else "system"))
+        group = "system"
+        if item.path.stem in _SECOND_GROUP:
+            group = "system_runs"
+        elif item.path.stem in _THIRD_GROUP:
+            group = "system_safety"
+        item.add_marker(pytest.mark.xdist_group(group))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the two long groups; the short tests fill what time they leave."""
+    """Begin with the long groups; the short tests fill what time they leave."""
     items.sort(key=lambda item: item.get_closest_marker("system") is None)
 
 

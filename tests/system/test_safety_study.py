@@ -81,7 +81,8 @@ def violated(make: Make, plants: dict[str, Any], *, localizer: bool = False) -> 
 
 
 def never_brakes(row: Row) -> Row:
-    return row | {"permitted_mps": np.inf, "service_brake": 0.0, "emergency_brake": 0.0}
+    demands = ("service_brake", "emergency_brake", "traction_cut_off")
+    return row | {"permitted_mps": np.inf} | dict.fromkeys(demands, 0.0)
 
 
 def never_lets_go(row: Row) -> Row:

@@ -53,6 +53,8 @@ class TickInputs:
         self._inbox: TickInbox[Any] = TickInbox()
         self._owners: dict[str, str] = {}
         self._triggers: set[str] = set()
+        self._delayed: list[str] = []
+        self._joined = False
         self._watch = (
             None
             if timeout_s is None
@@ -91,6 +93,8 @@ class TickInputs:
         put, advance, begin = self._inbox.put, self._advance, self._begin_tick
 
         def receive(stamp_ns: int, item: Any) -> None:
+            if not self._joined:
+                self._join(stamp_ns)
             complete = put(stamp_ns, port, item)
             begin()
             if complete:
@@ -120,7 +124,7 @@ class TickInputs:
             account without ``timeout_s``.
         delay_ns : int
             Added to its stamps. What is sent in one tick and needed in the next comes a tick
-            late; in the first tick, at 0, the item is None.
+            late; in the first tick that the node takes part in, the item may be None.
         **parts
             Of the name of the topic.
 
@@ -163,7 +167,14 @@ class TickInputs:
         if self._watch is not None:
             self._owners[port] = owner
         if delay_ns:
+            self._delayed.append(port)
             self._inbox.put(0, port, None)
+
+    def _join(self, stamp_ns: int) -> None:
+        """Begin with a tick; who joins in the midst of a run waits for nothing of before."""
+        self._joined = True
+        for port in self._delayed:
+            self._inbox.put(stamp_ns, port, None)
 
     def _begin_tick(self) -> None:
         if self._watch is not None:

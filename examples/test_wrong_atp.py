@@ -17,7 +17,7 @@ class CarelessAtp(AtpNode, name="atp", namespace="/train_1"):
         """Open the ports of its kind, but say what it likes."""
         super().setup()
         command = self._command
-        self._command = lambda stamp_ns, _: command(stamp_ns, np.array([[22.0, 0.0, 0.0, 0.0]]))
+        self._command = lambda stamp_ns, _: command(stamp_ns, np.array([[22.0, *[0.0] * 5]]))
 
 
 def behind_a_train_that_stops(corridor):

@@ -82,7 +82,14 @@ def test_a_miscount_and_a_dead_point_are_in_the_report(with_it: Rail, installed:
     path = with_it.directory / "loose_head.yaml"
     path.write_text(shipped(installed) + fault)
     kill = ("--kill", "/wayside/dp3/wheel_sensor@20", "--timeout", 5)
-    report = with_it.report(path, "--processes", "one", "--duration", 40, *kill)
+    told = with_it.directory / "told.json"
+    run = with_it.start(
+        "run", path, "--processes", "one", "--duration", 40, *kill, "--report", told
+    )
+    # A section that is told to be free with a train in it is not safe.
+    assert with_it.finish(run) == 3, with_it.errors(run)
+    report = json.loads(told.read_text())
+    assert report["verdict"] == "unsafe"
     points, sections = (report["axle_counter"][name] for name in ("points", "sections"))
     assert points["dp1"]["miscounts"] == 8
     assert points["dp2"]["miscounts"] == 0

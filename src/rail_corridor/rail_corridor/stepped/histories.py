@@ -116,7 +116,7 @@ class Histories:
                 continue
             try:
                 view = history.latest
-            except ValueError as error:
+            except (ValueError, RuntimeError) as error:  # rclpy raises the second
                 return f"{name}: {error}"
             columns = view.columns if isinstance(view, RowView | TableView) else topic.columns
             if topic.columns and columns != topic.columns:

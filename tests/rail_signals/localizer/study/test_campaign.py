@@ -117,7 +117,7 @@ def one_run(readings: TickMeasurements, run: int) -> TickMeasurements:
     parts = []
     for reading in readings:
         values = {
-            key: value[run, 0].item() if key != "present" else None
+            key: value[run, 0].item() if isinstance(value, np.ndarray) else value
             for key, value in reading._asdict().items()
         }
         present = bool(reading.present[run, 0])
